@@ -13,7 +13,7 @@ packages=(
   # asynchronous reads
   liburing-dev
   # grid files
-  libcgns-dev libhdf5-dev libnetcdf-dev libproj-dev liblzma-dev
+  libblosc-dev libcgns-dev libhdf5-dev libnetcdf-dev libproj-dev liblzma-dev
   # vectors, formatting, command line, JSON
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # VTK files

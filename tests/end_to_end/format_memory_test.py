@@ -20,6 +20,7 @@ from tecplot_files import Binary, write_text
 from cgns_layout import CgnsLayout
 from mesh_ensight_test import EnsightFile
 from sweep import IS_WHOLE, ONLY_WHOLE
+from zarr_stores import Store
 
 try:
     import h5py
@@ -150,6 +151,15 @@ class FormatMemory(StructuredFormats):
         places = self.write_netcdf(self.folder / "c.nc", "NETCDF4", values=False)
         values = self.write_netcdf(self.folder / "d.nc", "NETCDF3_CLASSIC", places=False)
         self.expect_within("NetCDF, coordinates in a second file", values, places)
+
+    def test_zarr(self):
+        """In chunks of 1.1 MB, as NetCDF-4 above."""
+        store = Store(self.folder / "z.zarr", 3)
+        with netCDF4.Dataset(self.write_netcdf(self.folder / "z.nc", "NETCDF3_CLASSIC")) as f:
+            for name, variable in f.variables.items():
+                most = self.chunks(16, 60, 76) if variable.ndim == 3 else variable.shape
+                store.add(name, " ".join(variable.dimensions), variable[:].data, chunks=most, codecs=("blosc",), **variable.__dict__)
+        self.expect_within("Zarr", store.path)
 
     def test_netcdf_around_the_earth(self):
         """The last column is a step before the first."""

@@ -20,6 +20,7 @@ from vtk.util.numpy_support import numpy_to_vtk
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "end_to_end"))
 from cgns_library import ADF, CELL_CENTER, HEXA_8, VERTEX, CgnsFile
 from tecplot_files import Binary, padded, write_text
+from zarr_stores import Store
 
 OUT = pathlib.Path(sys.argv[1])
 POINTS = np.array([[i, j, k] for k in range(3) for j in range(2) for i in range(2)], "f8")
@@ -572,7 +573,20 @@ def part_records():
         put("part_record", name, struct.pack("<H", len(first)) + first + second)
 
 
+def zarr_seeds(folder):
+    codecs = {2: [("zlib",), ("blosc",), ("shuffle", "lz4")], 3: [("gzip", "crc32c"), ("zstd",), ("blosc",)]}
+    for version, chains in codecs.items():
+        for n, chain in enumerate(chains):
+            store = Store(folder / f"{version}{n}.zarr", version, {"title": "a seed"})
+            for name, units, length in (("lon", "degrees_east", 3), ("lat", "degrees_north", 4), ("depth", "m", 2)):
+                store.add(name, name, np.arange(length) * 1.0, units=units)
+            options = dict(shards=(2, 4, 2)) if (version, n) == (3, 1) else dict(order="F") if version == 2 and n == 1 else {}
+            store.add("temp", "depth lat lon", np.arange(24).reshape(2, 4, 3), kind=["f4", ">i2", "f8"][n], chunks=(1, 2, 2), codecs=chain, **options)
+            put("zarr", f"version{version}_{chain[0]}", store.zip().read_bytes())
+
+
 with tempfile.TemporaryDirectory() as name:
+    zarr_seeds(pathlib.Path(name))
     vtk_seeds(pathlib.Path(name))
     curved_seeds(pathlib.Path(name))
     curve_seeds(pathlib.Path(name))

@@ -1,9 +1,10 @@
-// Files in classic NetCDF, whose header libnetcdf parses once it has been checked here. NetCDF-4 is HDF5's.
+// Files in classic NetCDF, whose header libnetcdf parses once it has been checked here (NetCDF-4 is HDF5's), and Zarr.
 #include "preprocess/formats/columns/columns_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/formats/netcdf/netcdf_structure.h"
 #include "preprocess/formats/netcdf/open_netcdf.h"
+#include "preprocess/formats/netcdf/zarr_file.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/grid_reading.h"
 
@@ -69,6 +70,16 @@ void fuzzExodus(std::span<const std::byte> bytes) {
 }
 
 const RegisteredFuzzTarget exodus_target("exodus", fuzzExodus);
+
+// Zarr stores, as archives.
+void fuzzZarr(std::span<const std::byte> bytes) {
+  if (!textOf(bytes).starts_with("PK")) return;
+  OpenGridOptions options;
+  options.grid = fuzzFile("a.zip", bytes);
+  if (isZarrStore(options.grid)) readGrid(*openNetcdf(options));
+}
+
+const RegisteredFuzzTarget zarr_target("zarr", fuzzZarr);
 
 }  // namespace
 }  // namespace curvisplat

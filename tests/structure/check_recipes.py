@@ -15,7 +15,7 @@ PACKAGES = {
     "PNG": ("libpng", "libpng"), "tinyexr": ("tinyexr", "tinyexr"), "hwy": ("libhwy", "highway"), "pugixml": ("pugixml", "pugixml"),
     "ZLIB": ("zlib", "zlib-api"), "CGNS": ("cgns", "cgns"), "HDF5": ("hdf5", "hdf5"), "libzstd": ("zstd", "zstd"), "liblz4": ("lz4-c", "lz4"),
     "liburing": ("liburing", "liburing"), "libxxhash": ("xxhash", "xxhash"), "netcdf": ("libnetcdf", "netcdf-c"), "proj": ("proj", "proj"),
-    "liblzma": ("liblzma-devel", "xz"), "cairo": ("cairo", "cairo"), "fontconfig": ("fontconfig", "fontconfig"),
+    "liblzma": ("liblzma-devel", "xz"), "blosc": ("blosc", "c-blosc"), "cairo": ("cairo", "cairo"), "fontconfig": ("fontconfig", "fontconfig"),
     "OpenVDB": ("openvdb", "openvdb"), "CLI11": ("cli11", "cli11"), "glfw3": ("glfw", "glfw"), "imgui": ("imgui", "imgui"),
     "JPEG": ("libjpeg-turbo", "libjpeg-turbo"), "Boost": ("libboost-devel", "boost"), "pybind11": ("pybind11", "py-pybind11"),
     "MPI": (None, "mpi"),

@@ -60,7 +60,7 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 # Its module for OpenVDB.
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS curvisplat)
 set(development_packages
-  libcgns-dev libfmt-dev libgl-dev libglm-dev libhdf5-dev libhwy-dev liblz4-dev liblzma-dev libnetcdf-dev
+  libblosc-dev libcgns-dev libfmt-dev libgl-dev libglm-dev libhdf5-dev libhwy-dev liblz4-dev liblzma-dev libnetcdf-dev
   libpng-dev libproj-dev libpugixml-dev libtbb-dev libtinyexr-dev liburing-dev libxxhash-dev libzstd-dev
   nlohmann-json3-dev pkg-config zlib1g-dev)
 if(CURVISPLAT_ANNOTATIONS)

@@ -1,4 +1,4 @@
-// HDF5, NetCDF, CGNS and PROJ. A plug-in, curvisplat-formats.so (tools/formats), links them. It is loaded
+// HDF5, NetCDF, CGNS, PROJ and Blosc. A plug-in, curvisplat-formats.so (tools/formats), links them. It is loaded
 // when one of their functions is first called: with the 40 libraries that they depend on, they would take
 // half of the time in which the program starts.
 //

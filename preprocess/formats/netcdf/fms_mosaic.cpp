@@ -87,7 +87,7 @@ bool isFile(const path& file) {
 bool mayBeMosaic(const path& file) {
   const std::string name = lowerCase(file.filename().string());
   return (name.find("mosaic") != std::string::npos || name.find("grid_spec") != std::string::npos) &&
-         !tileNumber(file) && NetcdfFile::recognises(InputFile(file));
+         !tileNumber(file) && isFile(file) && NetcdfFile::recognises(InputFile(file));
 }
 
 bool numbered(const std::vector<std::string>& names) {

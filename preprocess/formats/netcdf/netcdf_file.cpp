@@ -21,25 +21,6 @@
 namespace curvisplat {
 namespace {
 
-/// Attributes that are numbers by the conventions; some programs write them as text: missing_value = "-999".
-constexpr std::string_view kNumericAttributes[] = {"_FillValue",  "missing_value", "scale_factor",
-                                                   "add_offset",  "valid_min",     "valid_max",
-                                                   "valid_range", "flag_values",   "start_index"};
-
-/// Adds the numbers of a text that consists of numbers alone, separated by blanks or commas.
-void addNumbersOfText(NetcdfAttribute& attribute) {
-  std::string text = attribute.text;
-  std::replace(text.begin(), text.end(), ',', ' ');
-  std::vector<double> numbers;
-  for (std::string_view word : wordsOf(text)) {
-    double number = 0;
-    if (word.ends_with('f') || word.ends_with('F')) word.remove_suffix(1);
-    if (!parseNumber(word, number)) return;
-    numbers.push_back(number);
-  }
-  attribute.numbers.insert(attribute.numbers.end(), numbers.begin(), numbers.end());
-}
-
 // The cache of chunks of each open variable: the rows of a slab usually lie in a few chunks.
 constexpr size_t kChunkCacheBytes = size_t{2} << 20;
 constexpr size_t kChunkCacheSlots = 1009;
@@ -182,6 +163,8 @@ void NetcdfFile::readHeader() {
     dimensions_[static_cast<size_t>(id)] = {name, length, id == unlimited};
   }
   for (int id = 0; id < variables; ++id) readVariable(id);
+  of_file_.name = "the file";
+  readAttributes(NC_GLOBAL, attributes, of_file_);
 }
 
 void NetcdfFile::readGroups() {
@@ -210,7 +193,6 @@ void NetcdfFile::readVariable(int id) {
   NetcdfVariable variable;
   variable.name = name;
   variable.id = id;
-  variable.position = variables_.size();
   variable.type = type;
   variable.value_bytes = netcdfBytes(type);
   variable.numeric = variable.value_bytes > 0;
@@ -221,6 +203,11 @@ void NetcdfFile::readVariable(int id) {
     variable.dims.push_back(static_cast<size_t>(dimension));
   }
   readAttributes(id, attributes, variable);
+  addVariable(std::move(variable));
+}
+
+void NetcdfFile::addVariable(NetcdfVariable variable) {
+  variable.position = variables_.size();
   packings_.emplace_back(variable);
   variables_.push_back(std::move(variable));
 }
@@ -250,10 +237,7 @@ void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) con
       status = nc_get_att_double(file_, id, name, attribute.numbers.data());
     }
     if (status != NC_NOERR) fail(fmt::format("attribute {} of {}", name, variable.name), status);
-    if (std::find(std::begin(kNumericAttributes), std::end(kNumericAttributes), std::string_view(name)) !=
-        std::end(kNumericAttributes))
-      addNumbersOfText(attribute);
-    variable.attributes[name] = std::move(attribute);
+    variable.add(name, std::move(attribute));
   }
 }
 
@@ -276,44 +260,6 @@ const NetcdfVariable* NetcdfFile::find(std::string_view name) const {
   return nullptr;
 }
 
-std::string NetcdfFile::text(const char* attribute) const {
-  const QuietHdf5 quiet;
-  nc_type type = NC_NAT;
-  size_t length = 0;
-  if (nc_inq_att(opened(), NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length > kMaxAttributeValues)
-    return "";
-  std::string text;
-  if (type == NC_CHAR) {
-    text.resize(length);
-    if (nc_get_att_text(file_, NC_GLOBAL, attribute, text.data()) != NC_NOERR) return "";
-    text.resize(std::min(text.find('\0'), text.size()));
-  } else if (type == NC_STRING && length == 1) {
-    char* stored = nullptr;
-    if (nc_get_att_string(file_, NC_GLOBAL, attribute, &stored) != NC_NOERR) return "";
-    if (stored) text = stored;
-    nc_free_string(1, &stored);
-  }
-  return std::string(trimmed(text));
-}
-
-bool NetcdfFile::hasAttribute(const char* attribute) const {
-  const QuietHdf5 quiet;
-  int id = 0;
-  return nc_inq_attid(opened(), NC_GLOBAL, attribute, &id) == NC_NOERR;
-}
-
-std::vector<double> NetcdfFile::numbers(const char* attribute) const {
-  const QuietHdf5 quiet;
-  nc_type type = NC_NAT;
-  size_t length = 0;
-  if (nc_inq_att(opened(), NC_GLOBAL, attribute, &type, &length) != NC_NOERR || netcdfBytes(type) == 0 ||
-      length > kMaxAttributeValues)
-    return {};
-  std::vector<double> numbers(length);
-  if (nc_get_att_double(file_, NC_GLOBAL, attribute, numbers.data()) != NC_NOERR) return {};
-  return numbers;
-}
-
 std::optional<double> NetcdfFile::number(const char* attribute) const {
   const std::vector<double> found = numbers(attribute);
   return found.size() == 1 ? std::optional(found[0]) : std::nullopt;
@@ -326,15 +272,10 @@ const NetcdfDimension& NetcdfFile::dimension(const NetcdfVariable& variable, siz
 template <typename Value, typename Get>
 void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const NetcdfBox& box,
                           std::span<Value> to) const {
-  CURVISPLAT_CHECK_OP(box.start.size(), ==, variable.dims.size());
-  CURVISPLAT_CHECK_OP(box.values(), <=, to.size());
-  {
-    const QuietHdf5 quiet;
-    const int status = get(opened(), variable.id, box.start.data(), box.count.data(), to.data());
-    // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
-    if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
-  }
-  packings_.at(variable.position).unpack(to.first(box.values()));
+  const QuietHdf5 quiet;
+  const int status = get(opened(), variable.id, box.start.data(), box.count.data(), to.data());
+  // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
+  if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
 }
 
 std::string NetcdfFile::readText(const NetcdfVariable& variable) const {
@@ -384,12 +325,30 @@ std::vector<std::string> NetcdfFile::readStrings(const NetcdfVariable& variable)
   return found;
 }
 
-void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const {
+void NetcdfFile::readStored(const NetcdfVariable& variable, const NetcdfBox& box,
+                            std::span<double> to) const {
   readWith(nc_get_vara_double, variable, box, to);
 }
 
-void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const {
+void NetcdfFile::readStored(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const {
   readWith(nc_get_vara_float, variable, box, to);
+}
+
+template <typename Value>
+void NetcdfFile::readUnpacked(const NetcdfVariable& variable, const NetcdfBox& box,
+                              std::span<Value> to) const {
+  CURVISPLAT_CHECK_OP(box.start.size(), ==, variable.dims.size());
+  CURVISPLAT_CHECK_OP(box.values(), <=, to.size());
+  readStored(variable, box, to);
+  packings_.at(variable.position).unpack(to.first(box.values()));
+}
+
+void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const {
+  readUnpacked(variable, box, to);
+}
+
+void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const {
+  readUnpacked(variable, box, to);
   if (variable.type == NC_DOUBLE)
     convertIfZero(to.first(box.values()), [&](std::span<double> stored) { read(variable, box, stored); });
 }

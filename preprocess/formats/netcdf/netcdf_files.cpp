@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/netcdf/zarr_file.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -34,10 +35,10 @@ NetcdfFiles::NetcdfFiles(const OpenGridOptions& options) {
   std::vector<std::filesystem::path> paths{options.grid};
   paths.insert(paths.end(), options.solutions.begin(), options.solutions.end());
   for (const std::filesystem::path& path : paths) {
-    if (!files_.empty() && !NetcdfFile::recognises(InputFile(path)))
+    if (!files_.empty() && !isNetcdf(path))
       throw Error("{}: is not a NetCDF file; expected one, like {}, for further variables of its grid",
                   path.string(), paths.front().string());
-    auto file = std::make_unique<NetcdfFile>(path);
+    auto file = openNetcdfFile(path);
     const std::optional<NetcdfDomain> domain = NetcdfDomain::of(*file);
     const auto whole = std::find_if(files_.begin(), files_.end(),
                                     [&](const NetcdfTiles& tiles) { return tiles.includes(*file, domain); });

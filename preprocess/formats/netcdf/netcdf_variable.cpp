@@ -4,13 +4,45 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <string_view>
 #include <utility>
 
+#include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/netcdf/netcdf_library.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
+namespace {
+
+/// Attributes that are numbers by the conventions; some programs write them as text: missing_value = "-999".
+constexpr std::string_view kNumericAttributes[] = {"_FillValue",  "missing_value", "scale_factor",
+                                                   "add_offset",  "valid_min",     "valid_max",
+                                                   "valid_range", "flag_values",   "start_index"};
+
+/// Adds the numbers of a text that consists of numbers alone, separated by blanks or commas.
+void addNumbersOfText(NetcdfAttribute& attribute) {
+  std::string text = attribute.text;
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::vector<double> numbers;
+  for (std::string_view word : wordsOf(text)) {
+    double number = 0;
+    if (word.ends_with('f') || word.ends_with('F')) word.remove_suffix(1);
+    if (!parseNumber(word, number)) return;
+    numbers.push_back(number);
+  }
+  attribute.numbers.insert(attribute.numbers.end(), numbers.begin(), numbers.end());
+}
+
+}  // namespace
+
+void NetcdfVariable::add(const std::string& name_of_attribute, NetcdfAttribute attribute) {
+  if (std::find(std::begin(kNumericAttributes), std::end(kNumericAttributes), name_of_attribute) !=
+      std::end(kNumericAttributes))
+    addNumbersOfText(attribute);
+  attributes[name_of_attribute] = std::move(attribute);
+}
 
 std::string NetcdfVariable::text(const char* attribute) const {
   const auto found = attributes.find(attribute);

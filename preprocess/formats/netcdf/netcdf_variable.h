@@ -37,6 +37,8 @@ struct NetcdfVariable {
   std::vector<size_t> dims;  // indices into NetcdfFile::dimensions(), slowest first
   std::map<std::string, NetcdfAttribute> attributes;
 
+  /// Adds or replaces an attribute. Numbers that some programs write as text are numbers: missing_value = "-999".
+  void add(const std::string& name_of_attribute, NetcdfAttribute attribute);
   /// The text of an attribute without the blanks that Fortran pads it with; empty if there is none.
   std::string text(const char* attribute) const;
   /// The numbers of an attribute; none if it is not there, or text.

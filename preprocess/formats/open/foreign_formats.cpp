@@ -352,9 +352,6 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
 
 std::optional<std::string> foreignFolder(const std::filesystem::path& folder) {
   std::error_code error;
-  for (const char* mark : {".zgroup", ".zarray", ".zmetadata", "zarr.json"})
-    if (std::filesystem::is_regular_file(folder / mark, error))
-      return "a Zarr store, which is not read (save it as NetCDF, with xarray's to_netcdf)";
   if (std::filesystem::is_regular_file(folder / "Header", error) &&
       std::filesystem::is_directory(folder / "Level_0", error))
     return "a plotfile of AMReX, which is not read (save it as VTK's .vthb, with ParaView)";

@@ -23,6 +23,7 @@
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/formats/netcdf/open_netcdf.h"
+#include "preprocess/formats/netcdf/zarr_file.h"
 #include "preprocess/formats/open/combined_source.h"
 #include "preprocess/formats/open/foreign_formats.h"
 #include "preprocess/formats/open/indirect_files.h"
@@ -177,6 +178,7 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
     requireNoSelection(options);
     return openFoam(options);
   }
+  if (isZarrStore(options.grid)) return openNetcdfGrid(options);
   if (isRegularFile(options.grid)) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
@@ -244,7 +246,7 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
 }
 
 bool isGridFolder(const std::filesystem::path& path) {
-  return isFoamCase(path) || foreignFolder(path);
+  return isFoamCase(path) || isZarrStore(path) || foreignFolder(path);
 }
 
 std::unique_ptr<GridSource> requireGrid(std::unique_ptr<DataSource> source, const char* cannot) {

@@ -43,6 +43,7 @@ class Curvisplat(CMakePackage):
     depends_on("tbb")
     depends_on("tinyexr")
     depends_on("xxhash")
+    depends_on("c-blosc")
     depends_on("xz")
     depends_on("zlib-api")
     depends_on("zstd")

@@ -1,0 +1,85 @@
+// The metadata of an array of a Zarr store, version 2 or 3: its shape, its chunks, the type of its values, and the
+// codecs that its chunks are stored with. Pure, but for reading text: any thread.
+//
+//   version 2   NAME/.zarray, NAME/.zattrs       chunks NAME/0.1.2 or NAME/0/1/2
+//   version 3   NAME/zarr.json                   chunks NAME/c/0/1/2; shards hold several chunks and their index
+//
+// Source: the Zarr specifications, versions 2 and 3, and their lists of codecs and data types.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "preprocess/formats/netcdf/netcdf_variable.h"
+
+namespace curvisplat {
+
+enum class ZarrNumber {
+  kNone,
+  kInt8,
+  kUint8,
+  kInt16,
+  kUint16,
+  kInt32,
+  kUint32,
+  kInt64,
+  kUint64,
+  kHalf,
+  kFloat,
+  kDouble
+};
+
+/// How the bytes of values become those of a file; several in turn.
+struct ZarrCodec {
+  enum class Kind { kZlib, kZstd, kBlosc, kLz4, kShuffle, kChecksum } kind;  // kZlib: gzip, too
+  size_t element_bytes = 0;                                                  // of kShuffle
+};
+
+struct ZarrArray {
+  std::string name;
+  int version = 2;
+  std::vector<uint64_t> shape, chunks;  // [axis]
+  std::vector<uint64_t> shards;         // [axis]: chunks in a file; all 1 without shards
+  std::vector<std::string> dimensions;  // [axis]; empty where the file has no name
+  std::vector<size_t> stored_axes;      // [axis in a chunk, slowest first]: of the array
+  ZarrNumber number = ZarrNumber::kNone;
+  enum class Text { kNone, kBytes, kUtf32, kVariable } text = Text::kNone;
+  size_t value_bytes = 0;  // of a stored value; 0: of variable length
+  bool big_endian = false;
+  double fill = std::numeric_limits<double>::quiet_NaN();  // of chunks that no file has
+  std::vector<ZarrCodec> codecs;                           // in the order of writing
+  bool sharded = false, index_first = false;               // a shard's index: before its chunks
+  bool index_checked = false;                              // four bytes of checksum follow the index
+  std::string prefix, separator;                           // of chunks' names
+  std::string refused;                                     // why values cannot be read; empty if they can
+  std::map<std::string, NetcdfAttribute> attributes;
+
+  uint64_t chunkValues() const;
+  uint64_t chunkBytes() const { return chunkValues() * value_bytes; }
+  uint64_t chunksInShard() const;
+  /// The nc_type of its values.
+  int type() const;
+};
+
+/// The attributes in the JSON text of a .zattrs file. `file`: for messages. Throws Error.
+std::map<std::string, NetcdfAttribute> zarrAttributes(std::string_view text, const std::string& file);
+
+/// An array of version 2 by the texts of its .zarray and .zattrs. Throws Error for what is not metadata of an
+/// array, and for chunks larger than 500 MiB; what is only not read here is `refused`.
+ZarrArray zarrArray2(const std::string& name, std::string_view array, std::string_view attributes,
+                     const std::string& file);
+
+/// The contents of a zarr.json: an array, or a group with its attributes.
+struct ZarrNode {
+  std::optional<ZarrArray> array;
+  std::map<std::string, NetcdfAttribute> attributes;
+};
+ZarrNode zarrNode3(const std::string& name, std::string_view text, const std::string& file);
+
+}  // namespace curvisplat
