@@ -19,6 +19,7 @@ import mesh_cgns_test
 import mesh_curved_test
 import mesh_ensight_test
 import mesh_files_test
+import mesh_fluent_test
 import mesh_foam_test
 import mesh_formats_test
 import mesh_su2_test
@@ -63,6 +64,13 @@ class MeshBytes(MeshFormats):
         for parts in some_of((3, 1), 2):
             case = writer.foam_case(SIDE, parts, binary=True)[0]
             self.expect_same_bytes(case / "case.foam", scalars=("p",))
+
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
+    def test_fluent(self):
+        points, corners = mesh_fluent_test.lattice(SIDE), mesh_fluent_test.hexahedra(SIDE)
+        case = mesh_fluent_test.Case(self.folder / "a.cas.h5", points, list(map(mesh_fluent_test.hexahedron, corners)), 2)
+        case.data(self.folder / "a.dat.h5", {"SV_P": np.arange(len(corners)) ** 0.5}, sections=3)
+        self.expect_same_bytes(case.path, scalars=("SV_P",))
 
     @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     @unittest.skipUnless(cg.library(), "no libcgns")

@@ -1,4 +1,4 @@
-// VTKHDF: HDF5 files that HDF5 itself writes, whole and sound, with objects of any name, type and extent. Damaged structures of HDF5
+// VTKHDF and Fluent: HDF5 files that HDF5 itself writes, whole and sound, with objects of any name, type and extent. Damaged structures of HDF5
 // are tried in a process of their own (library_trial.h), and by tests of the whole program.
 #include <hdf5.h>
 
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/fluent/fluent_source.h"
 #include "preprocess/formats/vtk/vtk_hdf.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/grid_reading.h"
@@ -91,20 +92,32 @@ class Writer {
 // Objects of a file, one after the other: a byte for its kind, its path as a text (a byte for the length, and the bytes). Then a text for
 // what a link leads to; else for the name of an attribute, and its text; or the type, the extent (rank, and 16 bits along each
 // dimension) and the values of numbers.
-void fuzzVtkHdf(std::span<const std::byte> bytes) {
+OpenGridOptions written(const char* name, std::span<const std::byte> bytes) {
   OpenGridOptions options;
-  options.grid = fuzzFolder() / "a.vtkhdf";
+  options.grid = fuzzFolder() / name;
   options.temporary_folder = fuzzFolder();
-  {
-    const QuietHdf5 quiet;
-    Writer writer(options.grid);
-    FuzzInput input(bytes);
-    for (int n = 0; n < kMaxObjects && !input.rest().empty(); ++n) writer.add(input);
-  }
+  const QuietHdf5 quiet;
+  Writer writer(options.grid);
+  FuzzInput input(bytes);
+  for (int n = 0; n < kMaxObjects && !input.rest().empty(); ++n) writer.add(input);
+  return options;
+}
+
+void fuzzVtkHdf(std::span<const std::byte> bytes) {
+  const OpenGridOptions options = written("a.vtkhdf", bytes);
   if (isVtkHdf(InputFile(options.grid))) readData(openVtkHdf(options));
 }
 
 const RegisteredFuzzTarget vtk_hdf_target("vtk_hdf", fuzzVtkHdf);
+
+// A Fluent case and its data in one file.
+void fuzzFluent(std::span<const std::byte> bytes) {
+  OpenGridOptions options = written("a.cas.h5", bytes);
+  options.solutions = {options.grid};
+  if (isFluentHdf5(InputFile(options.grid))) readData(openFluent(options));
+}
+
+const RegisteredFuzzTarget fluent_target("fluent", fuzzFluent);
 
 }  // namespace
 }  // namespace curvisplat

@@ -146,19 +146,57 @@ def curve_seeds(folder):
     put("curve_text", "points", b"\1" + b"0 0 0\n1 0.5 -2\r\n")
 
 
+def text(value):
+    """For the targets that write objects by HDF5."""
+    return bytes([len(value)]) + value.encode()
+
+
+def numbers(values):
+    kinds = {"<f4": 0, "f8": 1, "|u1": 3, "<i2": 4, "<i4": 5, "<i8": 6}
+    values = np.asarray(values)
+    values = values.astype("i8") if values.dtype.kind == "i" else values
+    stored = values.astype(">f8") if values.dtype == "f8" else values
+    return (bytes([kinds[values.dtype.str if values.dtype != "f8" else "f8"], values.ndim]) +
+            struct.pack(f"<{values.ndim}H", *values.shape) + stored.tobytes())
+
+
+def fluent_seeds():
+    """Two cubes of 11 faces: all in one section, or in several; refined, with an interface."""
+    faces = {}
+    for n, cell in enumerate(CELLS, 1):
+        for face in FACES:
+            points = [int(cell[m]) for m in face]
+            faces.setdefault(tuple(sorted(points)), [points]).append(n)
+    faces = sorted((points, *cells, *[0] * (2 - len(cells))) for points, *cells in faces.values())
+    faces.sort(key=lambda face: face[2] == 0)
+    for name, parts in (("one", 1), ("three", 3)):
+        objects = [b"\1" + text("/meshes/1") + text(key) + numbers([value]) for key, value in
+                   dict(dimension=3, nodeCount=12, faceCount=len(faces), cellCount=2).items()]
+
+        def add(path, some, values):
+            ids = [b"\1" + text(path) + text(key) + numbers([value]) for key, value in (("minId", some[0] + 1), ("maxId", some[-1] + 1))]
+            objects.extend([b"\0" + text(path) + numbers(values), *ids] if values is not None else ids)
+
+        for n, some in enumerate(np.array_split(np.arange(12), parts), 1):
+            add(f"/meshes/1/nodes/coords/{n}", some, POINTS[some])
+        for n, some in enumerate(np.array_split(np.arange(len(faces)), parts), 1):
+            add(f"/meshes/1/faces/nodes/{n}", some, None)
+            objects.append(b"\0" + text(f"/meshes/1/faces/nodes/{n}/nnodes") + numbers([4] * len(some)))
+            objects.append(b"\0" + text(f"/meshes/1/faces/nodes/{n}/nodes") + numbers([p + 1 for face in some for p in faces[face][0]]))
+            add(f"/meshes/1/faces/c0/{n}", some, [faces[face][1] for face in some])
+        add("/meshes/1/faces/c1/1", [0], [faces[0][2]])
+        add("/results/1/phase-1/cells/SV_P/1", [0, 1], [1.0, 2])
+        add("/results/1/phase-2/cells/SV_U/1", [0, 1], [[1.0, 2, 3], [4, 5, 6]])
+        if parts > 1:
+            add("/meshes/1/cells/tree/1", [1], None)
+            objects += [b"\1" + text("/meshes/1/faces/interface") + text(key) + numbers([value]) for key, value in (("nData", 3), ("nZones", 1))]
+            objects.append(b"\0" + text("/meshes/1/faces/interface/nciTopology") + numbers([7, 11, 11]))
+        objects.append(b"\2" + text("/settings") + text("a") + text("b"))
+        put("fluent", name, b"".join(objects))
+
+
 def vtk_hdf_seeds():
     """Of objects that the target writes by HDF5."""
-    def text(value):
-        return bytes([len(value)]) + value.encode()
-
-    def numbers(values):
-        kinds = {"<f4": 0, "f8": 1, "|u1": 3, "<i2": 4, "<i4": 5, "<i8": 6}
-        values = np.asarray(values)
-        values = values.astype("i8") if values.dtype.kind == "i" else values
-        stored = values.astype(">f8") if values.dtype == "f8" else values
-        return (bytes([kinds[values.dtype.str if values.dtype != "f8" else "f8"], values.ndim]) +
-                struct.pack(f"<{values.ndim}H", *values.shape) + stored.tobytes())
-
     def group(path, kind, arrays, version=(2, 0), **attributes):
         objects = [b"\2" + text(path) + text("Type") + text(kind), b"\1" + text(path) + text("Version") + numbers(version)]
         objects += [b"\1" + text(path) + text(name) + numbers(values) for name, values in attributes.items()]
@@ -596,6 +634,7 @@ with tempfile.TemporaryDirectory() as name:
     columns_seeds(pathlib.Path(name))
     adf_seeds(pathlib.Path(name))
 vtk_hdf_seeds()
+fluent_seeds()
 set_seeds()
 compressed_seeds()
 foam_seeds()

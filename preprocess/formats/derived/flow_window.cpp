@@ -42,8 +42,9 @@ FlowInputs findFlowInputs(const GridDescription& description) {
     inputs.momentum = {find({"momentumx", "momentum:x", "xmomentum", "rhou"}),
                        find({"momentumy", "momentum:y", "ymomentum", "rhov"}),
                        find({"momentumz", "momentum:z", "zmomentum", "rhow"})};
-    inputs.velocity = {find({"velocityx", "velocity:x"}), find({"velocityy", "velocity:y"}),
-                       find({"velocityz", "velocity:z"})};
+    // SV_U: Fluent's.
+    inputs.velocity = {find({"velocityx", "velocity:x", "svu"}), find({"velocityy", "velocity:y", "svv"}),
+                       find({"velocityz", "velocity:z", "svw"})};
     if (inputs.hasVelocity() || inputs.hasPressure()) return inputs;
   }
   inputs.centring = Centring::kNode;

@@ -262,12 +262,6 @@ std::optional<std::string> foreignNetcdf(const NetcdfFiles& file) {
                                                        : "an unstructured grid";
   if (hasDimensions(file, {"nCells", "nVertices"})) return "an unstructured mesh (MPAS)";
   if (mentions(file, {"Type", "Origin"}, "TUFLOWFV")) return "an unstructured mesh (TUFLOW FV)";
-  const std::vector<std::string>& groups = file.groups();
-  const auto has = [&](const char* group) {
-    return std::find(groups.begin(), groups.end(), group) != groups.end();
-  };
-  if (file.plainHdf5() && has("settings") && (has("meshes") || has("results")))
-    return "a Fluent case or its data (save it as CGNS or EnSight Gold)";
   if (file.plainHdf5()) return "an HDF5 file, but neither NetCDF-4 nor CGNS";
   return std::nullopt;
 }

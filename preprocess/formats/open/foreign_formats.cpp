@@ -313,7 +313,7 @@ constexpr Magic kHdf5Marks[] = {
     {"tstt"sv, "a MOAB mesh (.h5m), which is not read (mbconvert FILE mesh.vtk)"},
     {"PartType0"sv, "a snapshot of particles (GADGET), which has no grid"},
     {"NASTRAN"sv, "a result of Nastran (HDF5), which is not read"},
-    {"settings"sv, "a Fluent case or its data (save it as CGNS or EnSight Gold)"},
+    {"settings"sv, "a Fluent case without its mesh (give NAME.cas.h5)"},
 };
 
 /// "compressed with gzip (decompress it first)", "an XML file"; nullopt for a file that may be PLOT3D.

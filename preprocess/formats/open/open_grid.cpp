@@ -21,6 +21,7 @@
 #include "preprocess/formats/ensight/ensight_case.h"
 #include "preprocess/formats/ensight/ensight_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
+#include "preprocess/formats/fluent/fluent_source.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/formats/netcdf/open_netcdf.h"
 #include "preprocess/formats/netcdf/zarr_file.h"
@@ -79,6 +80,7 @@ constexpr GridFormat kFormats[] = {
     {isPlot3dMeta, openPlot3dMeta, MoreFiles::kNone},
     {isVtkHdf, openVtkHdf, MoreFiles::kCombined},            // before NetCDF, which takes all HDF5 files
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
+    {isFluentHdf5, openFluent, MoreFiles::kByItself},        // before NetCDF, which takes all HDF5 files
     {isExodus, openExodus, MoreFiles::kCombined},            // before NetCDF, which they are
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
