@@ -159,6 +159,65 @@ class VtkHdf(MeshFormats):
             self.assertEqual([s["name"] for s in info["scalars"][:5]], ["p", "v:mag", "v:x", "v:y", "v:z"])
             self.assertIn("VTKHDF ImageData, 1 block", info["format"])
 
+    def test_rectilinear_and_curvilinear_grids(self):
+        """As version 2.7 has them: one after another in a series, or with places that stay."""
+        image, steps = Image(first=(0, 0, 0), kind="f4"), 3
+        axes = [np.cumsum(RANDOM.random((steps, n)) + 0.1, axis=1) for n in image.shape[::-1]]
+        z, y, x = np.meshgrid(*(axis[0] for axis in axes[::-1]), indexing="ij")
+        points = np.stack([np.stack([x + 0.1 * n * y, y, z + 0.1 * x], -1) for n in range(steps)])
+
+        def expected(kind, step):
+            grid, writer = (vtk.vtkRectilinearGrid(), vtk.vtkXMLRectilinearGridWriter()) if kind == "RectilinearGrid" else (
+                vtk.vtkStructuredGrid(), vtk.vtkXMLStructuredGridWriter())
+            grid.SetDimensions(*image.shape[::-1])
+            if kind == "RectilinearGrid":
+                for letter, axis in zip("XYZ", axes):
+                    getattr(grid, f"Set{letter}Coordinates")(numpy_to_vtk(axis[step], deep=True))
+            else:
+                of_grid = vtk.vtkPoints()
+                of_grid.SetData(numpy_to_vtk(points[step].reshape(-1, 3), deep=True))
+                grid.SetPoints(of_grid)
+            for data, name in ((grid.GetPointData(), "p"), (grid.GetCellData(), "c")):
+                array = numpy_to_vtk(getattr(image, name).ravel() + np.float32(step), deep=True)
+                array.SetName(name)
+                data.AddArray(array)
+            path = self.folder / f"expected.{'vtr' if kind == 'RectilinearGrid' else 'vts'}"
+            writer.SetFileName(str(path))
+            writer.SetInputData(grid)
+            writer.Write()
+            return path
+
+        for kind in ("RectilinearGrid", "StructuredGrid"):
+            for count, moving in ((0, False), (steps, True), (steps, False)):
+                with self.file() as f:
+                    group = f.create_group("VTKHDF")
+                    head(group, kind, (2, 7), WholeExtent=image.extent())
+                    for data, name in (("PointData", "p"), ("CellData", "c")):
+                        values = getattr(image, name)
+                        group[f"{data}/{name}"] = np.stack([values + np.float32(n) for n in range(count)]) if count else values
+                    places = slice(None, steps) if moving else 0
+                    if kind == "StructuredGrid":
+                        group["Points"] = points[places]
+                    else:
+                        for letter, axis in zip("XYZ", axes):
+                            group[f"{letter}Coordinates"] = axis[places].ravel()
+                    if count:
+                        group["Steps/Values"] = np.arange(count) * 0.5
+                        group["Steps/PointOffsets"] = np.arange(count) * moving
+                        for letter, axis in zip("XYZ", axes):
+                            group[f"Steps/{letter}CoordinatesOffsets"] = np.arange(count) * moving * axis.shape[1]
+                for step in range(max(1, count)):
+                    if step == 0 or moving:
+                        self.expect_same_caches([self.path], expected(kind, step), options=("--time-step", step) if count else ())
+                info = self.info(self.path)
+                self.assertIn(f"VTKHDF {kind}, 1 block", info["format"])
+            with h5py.File(self.path, "r+") as f:
+                place = "VTKHDF/Points" if kind == "StructuredGrid" else "VTKHDF/YCoordinates"
+                values = f[place][...]
+                del f[place]
+                f[place] = values[:2]
+            self.expect_line(self.path, words="expected")
+
     def test_meshes(self):
         mesh = Mesh()
         for options in ({}, {"chunks": (7,)}):

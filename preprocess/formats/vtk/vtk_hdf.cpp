@@ -37,10 +37,10 @@ class HdfGatherer {
     if (type_ == "MultiBlockDataSet" || type_ == "PartitionedDataSetCollection")
       addSet();
     else if (!addDataSet(kRoot, ""))
-      file_.fail(kRoot,
-                 fmt::format("is of type \"{}\"; expected ImageData, UnstructuredGrid, OverlappingAMR, "
-                             "MultiBlockDataSet or PartitionedDataSetCollection",
-                             printable(type_)));
+      file_.fail(kRoot, fmt::format("is of type \"{}\"; expected ImageData, RectilinearGrid, StructuredGrid, "
+                                    "UnstructuredGrid, OverlappingAMR, "
+                                    "MultiBlockDataSet or PartitionedDataSetCollection",
+                                    printable(type_)));
     if (!grid_.pieces.empty()) return std::make_unique<VtkSource>(finishGrid());
     if (mesh_.pieces.empty())
       file_.fail(kRoot, fmt::format("contains no structured grid and no unstructured one{}{}",
@@ -124,8 +124,8 @@ class HdfGatherer {
   /// Returns false if it is of a type that is not read.
   bool addDataSet(const std::string& group, const std::string& name) {
     const std::string type = typeOf(group);
-    if (type == "ImageData")
-      addImage(group, name);
+    if (type == "ImageData" || type == "RectilinearGrid" || type == "StructuredGrid")
+      addStructured(group, name, type);
     else if (type == "UnstructuredGrid")
       addMesh(group, name);
     else if (type == "OverlappingAMR")
@@ -212,51 +212,84 @@ class HdfGatherer {
     grid_.pieces.push_back(std::move(piece));
   }
 
-  void addImage(const std::string& group, const std::string& name) {
-    const std::vector<double> ends = file_.numbers(group, "WholeExtent", 6),
-                              origin = file_.numbers(group, "Origin", 3),
+  /// The nodes of an image, by its attributes.
+  VtkUniformNodes uniformNodes(const std::string& group) const {
+    const std::vector<double> origin = file_.numbers(group, "Origin", 3),
                               spacing = file_.numbers(group, "Spacing", 3);
-    const auto extent = extentWith(ends);
-    if (!extent)
-      file_.fail(group,
-                 fmt::format("has a WholeExtent of {}; expected the first and last node along i, j and k",
-                             fmt::join(ends, " ")));
     VtkUniformNodes nodes{{origin[0], origin[1], origin[2]}, {spacing[0], spacing[1], spacing[2]}};
     if (file_.hasAttribute(group, "Direction")) {
       const std::vector<double> rows = file_.numbers(group, "Direction", 9);
       for (glm::length_t n = 0; n < 9; ++n) nodes.direction[n % 3][n / 3] = rows[static_cast<size_t>(n)];
     }
+    return nodes;
+  }
+
+  /// The coordinates along i, j and k: in each step those behind the ones of earlier steps, or the same.
+  VtkAxes axesOf(const std::string& group, const Step& step, const VtkExtent& extent) const {
+    VtkAxes axes;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const std::string name = fmt::format("{}Coordinates", "XYZ"[axis]),
+                        place = fmt::format("{}/{}", group, name);
+      axes[axis] = file_.tuples(place, inStep(step, name + "Offsets").value_or(0), extent.nodesAlong(axis));
+      if (axes[axis].components != 1) file_.fail(place, "has more than one component; expected coordinates");
+    }
+    return axes;
+  }
+
+  /// The positions of a curvilinear grid, an array as those of values. Those of all steps may be the same.
+  VtkPoints pointsOf(const std::string& group, const Step& step, const VtkExtent& extent) const {
+    const std::string place = group + "/Points";
+    const bool of_steps = step.count > 0 && file_.required(place)->dims().size() > 4;
+    VtkPoints points =
+        imageArray(of_steps ? inStep(step, "PointOffsets").value_or(0) : std::optional<uint64_t>(), extent,
+                   place, false);
+    if (points.components != 3)
+      file_.fail(place, fmt::format("has {} components; expected 3", points.components));
+    return points;
+  }
+
+  void addStructured(const std::string& group, const std::string& name, const std::string& type) {
+    const std::vector<double> ends = file_.numbers(group, "WholeExtent", 6);
+    const auto extent = extentWith(ends);
+    if (!extent)
+      file_.fail(group,
+                 fmt::format("has a WholeExtent of {}; expected the first and last node along i, j and k",
+                             fmt::join(ends, " ")));
     VtkPiece piece;
     piece.extent = *extent;
-    piece.nodes = nodes;
     const Step step = stepOf(group);
+    if (type == "RectilinearGrid")
+      piece.nodes = axesOf(group, step, *extent);
+    else if (type == "StructuredGrid")
+      piece.nodes = pointsOf(group, step, *extent);
+    else
+      piece.nodes = uniformNodes(group);
     if (!extent->isFlat())  // flat ones have fewer dimensions, and are not drawn
       addArrays(group, piece, [&](const std::string& place, const std::string& array, bool of_cells) {
-        return imageArray(step, *extent, place, array, of_cells);
+        const auto own = inStep(step, fmt::format("{}DataOffsets/{}", of_cells ? "Cell" : "Point", array));
+        return imageArray(step.count > 0 ? own.value_or(step.number) : std::optional<uint64_t>(), *extent,
+                          place, of_cells);
       });
     addBlock(name.empty() ? "block 1" : name, std::move(piece));
   }
 
-  /// An array of (step,) k, j, i (and component).
-  VtkArray imageArray(const Step& step, const VtkExtent& extent, const std::string& place,
-                      const std::string& name, bool of_cells) const {
+  /// An array of k, j, i (and component): the box with this number, where there are several, of a step each.
+  VtkArray imageArray(std::optional<uint64_t> number, const VtkExtent& extent, const std::string& place,
+                      bool of_cells) const {
     const auto array = file_.required(place);
     std::vector<uint64_t> expected;
-    if (step.count > 0) expected.push_back(array->dims()[0]);
+    if (number) expected.push_back(array->dims()[0]);
     for (const size_t axis : {2, 1, 0}) expected.push_back(extent.nodesAlong(axis) - (of_cells ? 1 : 0));
-    const uint64_t number =
-        step.count == 0 ? 0
-                        : inStep(step, fmt::format("{}DataOffsets/{}", of_cells ? "Cell" : "Point", name))
-                              .value_or(step.number);
     uint64_t components = 1;
     if (array->dims().size() == expected.size() + 1) expected.push_back(components = array->dims().back());
     if (array->dims() != expected || components == 0 || components > kMaxComponents ||
-        (step.count > 0 && number >= expected[0]))
+        (number && *number >= expected[0]))
       file_.fail(place, fmt::format("has the dimensions {}; expected {}{} of an image of {} nodes",
-                                    fmt::join(array->dims(), "x"), step.count > 0 ? "the steps, then " : "",
+                                    fmt::join(array->dims(), "x"), number ? "the steps, then " : "",
                                     of_cells ? "the cells" : "the points", extent.describe()));
     const uint64_t tuples = of_cells ? extent.cells() : extent.nodes();
-    return vtkArrayOf(name, array, number * tuples * components, tuples, static_cast<uint32_t>(components));
+    return vtkArrayOf(place.substr(place.rfind('/') + 1), array, number.value_or(0) * tuples * components,
+                      tuples, static_cast<uint32_t>(components));
   }
 
   void addMesh(const std::string& group, const std::string& name) {
