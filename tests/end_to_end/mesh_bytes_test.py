@@ -15,6 +15,7 @@ import unittest
 from mesh_formats import PROGRAM, Mesh, MeshFormats, np, vtk, write_xml
 
 import cgns_library as cg
+import gmsh_files
 import mesh_cgns_test
 import mesh_curved_test
 import mesh_ensight_test
@@ -64,6 +65,15 @@ class MeshBytes(MeshFormats):
         for parts in some_of((3, 1), 2):
             case = writer.foam_case(SIDE, parts, binary=True)[0]
             self.expect_same_bytes(case / "case.foam", scalars=("p",))
+
+    @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
+    def test_gmsh(self):
+        grid = Mesh(SIDE, (8,)).vtk()
+        shuffled = np.random.default_rng(2).permutation(grid.GetNumberOfPoints()) + 1
+        file = gmsh_files.Msh(grid, tags=shuffled).mesh()
+        for data, of in ((grid.GetPointData(), "Node"), (grid.GetCellData(), "Element")):
+            file.data("pc"[of == "Element"], gmsh_files.vtk_to_numpy(data.GetArray("pc"[of == "Element"])), of)
+        self.expect_same_bytes(file.write(self.folder / "a.msh"), scalars=("p", "c"))
 
     @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     def test_fluent(self):

@@ -19,6 +19,7 @@ from vtk.util.numpy_support import numpy_to_vtk
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "end_to_end"))
 from cgns_library import ADF, CELL_CENTER, HEXA_8, VERTEX, CgnsFile
+from gmsh_files import Msh
 from tecplot_files import Binary, padded, write_text
 from zarr_stores import Store
 
@@ -193,6 +194,14 @@ def fluent_seeds():
             objects.append(b"\0" + text("/meshes/1/faces/interface/nciTopology") + numbers([7, 11, 11]))
         objects.append(b"\2" + text("/settings") + text("a") + text("b"))
         put("fluent", name, b"".join(objects))
+
+
+def gmsh_seeds():
+    of = grid()
+    for version, order in ((4.1, "<"), (4.1, ""), (2.2, "<"), (2.2, ""), (4.1, ">")):
+        file = Msh(of, version, order, tags=np.arange(12)[::-1] * 2 + 1 if order == ">" else np.arange(12) + 1).mesh()
+        file.data("p", np.arange(12.0)).data("p", np.arange(12.0), time=1.0).data("v", np.arange(3 * of.GetNumberOfCells()).reshape(-1, 3) * 1.0, "Element")
+        put("gmsh", f"{version}{order.replace('<', 'little').replace('>', 'big') or 'text'}", b"".join(file.out))
 
 
 def vtk_hdf_seeds():
@@ -635,6 +644,7 @@ with tempfile.TemporaryDirectory() as name:
     adf_seeds(pathlib.Path(name))
 vtk_hdf_seeds()
 fluent_seeds()
+gmsh_seeds()
 set_seeds()
 compressed_seeds()
 foam_seeds()

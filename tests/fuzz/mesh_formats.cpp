@@ -1,4 +1,4 @@
-// Unstructured grids: OpenFOAM, SU2 and EnSight.
+// Unstructured grids: OpenFOAM, Gmsh, SU2 and EnSight.
 #include <algorithm>
 #include <string>
 #include <string_view>
@@ -6,6 +6,7 @@
 
 #include "preprocess/formats/ensight/ensight_case.h"
 #include "preprocess/formats/ensight/ensight_source.h"
+#include "preprocess/formats/gmsh/gmsh_source.h"
 #include "preprocess/formats/openfoam/foam_source.h"
 #include "preprocess/formats/su2/su2_source.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -31,6 +32,16 @@ void fuzzOpenfoam(std::span<const std::byte> bytes) {
 }
 
 const RegisteredFuzzTarget openfoam_target("openfoam", fuzzOpenfoam);
+
+// A mesh of Gmsh.
+void fuzzGmsh(std::span<const std::byte> bytes) {
+  OpenGridOptions options;
+  options.grid = fuzzFile("a.msh", bytes);
+  options.temporary_folder = fuzzFolder();
+  if (isGmsh(InputFile(options.grid))) readData(openGmsh(options));
+}
+
+const RegisteredFuzzTarget gmsh_target("gmsh", fuzzGmsh);
 
 // A mesh of SU2, with its length in 16 bits before it; what is left over is a restart file.
 void fuzzSu2(std::span<const std::byte> bytes) {

@@ -249,8 +249,6 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   write("a.npy", "\x93NUMPY\1\0v\0{'descr': '<f4', 'fortran_order': False, 'shape': (6, 5, 7), }"s +
                      std::string(900, '\0'));
   expectNamed("a.npy", "a NumPy array without a grid");
-  write("a.msh", "$MeshFormat\n4.1 1 8\n\1\0\0\0\n$EndMeshFormat\n"s);
-  expectNamed("a.msh", "a Gmsh mesh");
   for (const char* text :
        {"(0 \"GAMBIT to Fluent File\")\n(2 3)\n", "(1 \"meshio 5.0.0\")\n(2 3)\n(10 (0 1 8 0))\n"}) {
     write("b.msh", text);

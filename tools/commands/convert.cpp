@@ -277,7 +277,7 @@ void addConvert(CLI::App& app) {
   command
       ->add_option(
           "GRID", arguments->grid.grid,
-          "Grid file (PLOT3D, VTK, CGNS, NetCDF, EnSight, Tecplot, XDMF, Exodus, Fluent or SU2), or the "
+          "Grid file (PLOT3D, VTK, CGNS, NetCDF, EnSight, Tecplot, XDMF, Exodus, Fluent, Gmsh or SU2), or the "
           "folder of an OpenFOAM case or a Zarr store")
       ->required();
   command->add_option("SOLUTION", arguments->grid.solutions,

@@ -222,10 +222,11 @@ void addCodecs3(ZarrArray& array, const JsonField& codecs, bool in_shard) {
     } else if (name == "transpose" && configuration && configuration->at("order").isArray() &&
                !array.sharded == !in_shard) {
       const std::vector<uint64_t> order = lengthsIn(configuration->at("order"), 0);
-      std::vector<size_t> axes(order.begin(), order.end()), sorted = axes;
+      std::vector<uint64_t> sorted = order;
       std::sort(sorted.begin(), sorted.end());
-      if (sorted != array.stored_axes) configuration->at("order").fail("each axis once");
-      array.stored_axes = std::move(axes);
+      if (!std::equal(sorted.begin(), sorted.end(), array.stored_axes.begin(), array.stored_axes.end()))
+        configuration->at("order").fail("each axis once");
+      array.stored_axes.assign(order.begin(), order.end());
     } else if (name == "sharding_indexed" && configuration && !in_shard && codecs.size() == 1) {
       const std::vector<uint64_t> inner = lengthsIn(configuration->at("chunk_shape"), 1);
       bool divides = inner.size() == array.chunks.size();

@@ -10,9 +10,9 @@
 
 namespace curvisplat {
 
-/// The bytes that the codecs of `array` have made `stored` of. Throws Error, with `place`, if they are damaged, or not
+/// The bytes that the codecs of `array` have made `bytes` of. Throws Error, with `place`, if they are damaged, or not
 /// exactly as many as the array's chunks have: of values of variable length, at most 16 MiB.
-std::vector<std::byte> decodedZarr(const ZarrArray& array, std::vector<std::byte> stored,
+std::vector<std::byte> decodedZarr(const ZarrArray& array, std::vector<std::byte> bytes,
                                    const std::string& place);
 
 }  // namespace curvisplat

@@ -56,7 +56,6 @@ constexpr Magic kMagics[] = {
      "a MATLAB file, which is not read (save it with -v7.3 and describe its arrays in an XDMF file)"},
     {"MATLAB 7.3 MAT-file"sv, "a MATLAB file (HDF5), whose arrays an XDMF file has to describe"},
     {"\x93NUMPY"sv, "a NumPy array without a grid, which is not read (an XDMF file describes arrays)"},
-    {"$MeshFormat"sv, "a Gmsh mesh, which is not read (meshio convert FILE mesh.vtu)"},
     {"\0\0\0\x10"
      "FILEHEAD"sv,
      "an ECLIPSE grid (EGRID), which is not read"},

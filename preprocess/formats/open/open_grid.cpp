@@ -22,6 +22,7 @@
 #include "preprocess/formats/ensight/ensight_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/fluent/fluent_source.h"
+#include "preprocess/formats/gmsh/gmsh_source.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/formats/netcdf/open_netcdf.h"
 #include "preprocess/formats/netcdf/zarr_file.h"
@@ -84,6 +85,7 @@ constexpr GridFormat kFormats[] = {
     {isExodus, openExodus, MoreFiles::kCombined},            // before NetCDF, which they are
     {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
+    {isGmsh, openGmsh, MoreFiles::kCombined},
     {isSu2, openSu2, MoreFiles::kByItself},
     {isTecplot, openTecplot, MoreFiles::kCombined},
     {isXdmf, openXdmf, MoreFiles::kCombined},

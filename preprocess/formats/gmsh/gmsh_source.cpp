@@ -1,0 +1,676 @@
+#include "preprocess/formats/gmsh/gmsh_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "preprocess/formats/common/element_source.h"
+#include "preprocess/formats/common/scalar_list.h"
+#include "preprocess/formats/common/spool_file.h"
+#include "preprocess/formats/common/text_reader.h"
+#include "preprocess/mesh/curved_cells.h"
+#include "stream/base/error.h"
+#include "stream/base/text.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr uint64_t kAtOnce = 65536, kTableAtOnce = 1 << 20, kMaxGap = 512;
+constexpr size_t kMaxBlocks = 1'000'000, kMaxData = 100'000;
+
+// ---- kinds of elements ----
+
+struct Element {
+  int type;
+  size_t nodes;
+  CellKind kind;
+  std::array<uint8_t, 27> order{};  // of second order: Gmsh's node for each of VTK's
+};
+
+/// Source: Gmsh's reference manual, "Node ordering" and "MSH file format".
+constexpr Element kElements[] = {
+    {4, 4, CellKind::kTetrahedron},
+    {5, 8, CellKind::kHexahedron},
+    {6, 6, CellKind::kWedge},
+    {7, 5, CellKind::kPyramid},
+    {11, 10, CellKind::kTetrahedron, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}},
+    {12, 27, CellKind::kHexahedron, {0,  1,  2,  3,  4,  5,  6,  7,  8,  11, 13, 9,  16, 18,
+                                     19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26}},
+    {13, 18, CellKind::kWedge, {0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16}},
+    {14, 14, CellKind::kPyramid, {0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12, 13}},
+    {17, 20, CellKind::kHexahedron, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}},
+    {18, 15, CellKind::kWedge, {0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11}},
+    {19, 13, CellKind::kPyramid, {0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12}},
+    // Of higher order.
+    {29, 20, CellKind::kTetrahedron},
+    {30, 35, CellKind::kTetrahedron},
+    {31, 56, CellKind::kTetrahedron},
+    {92, 64, CellKind::kHexahedron},
+    {93, 125, CellKind::kHexahedron},
+    {90, 40, CellKind::kWedge},
+    {91, 75, CellKind::kWedge},
+    {118, 30, CellKind::kPyramid},
+    {119, 55, CellKind::kPyramid},
+    // Points, lines and faces.
+    {15, 1, CellKind::kNone},
+    {1, 2, CellKind::kNone},
+    {2, 3, CellKind::kNone},
+    {3, 4, CellKind::kNone},
+    {8, 3, CellKind::kNone},
+    {9, 6, CellKind::kNone},
+    {10, 9, CellKind::kNone},
+    {16, 8, CellKind::kNone},
+    {20, 9, CellKind::kNone},
+    {21, 10, CellKind::kNone},
+    {22, 12, CellKind::kNone},
+    {23, 15, CellKind::kNone},
+    {24, 15, CellKind::kNone},
+    {25, 21, CellKind::kNone},
+    {26, 4, CellKind::kNone},
+    {27, 5, CellKind::kNone},
+    {28, 6, CellKind::kNone},
+    {36, 16, CellKind::kNone},
+    {37, 25, CellKind::kNone},
+    {38, 36, CellKind::kNone},
+};
+
+bool isCurved(const Element& element) {
+  return element.order[1] != 0;
+}
+bool isOfHigherOrder(const Element& element) {
+  return !isCurved(element) && element.nodes > cornersOf(element.kind);
+}
+
+// ---- the file ----
+
+/// The words of a file, and its numbers, which are text or binary.
+class Reader {
+ public:
+  explicit Reader(std::shared_ptr<const PooledFile> file)
+      : file_(std::move(file)), text_(file_, 0, file_->size()) {}
+
+  std::string name() const { return file_->name(); }
+  uint64_t size() const { return file_->size(); }
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error("{}: {} before byte {}; it is truncated or damaged: write it again", name(), what, offset());
+  }
+
+  void setBinary(bool swap) {
+    binary_ = true;
+    swap_ = swap;
+  }
+  bool isBinary() const { return binary_; }
+  uint64_t offset() const { return bytes_at_ > 0 ? bytes_at_ : text_.offset(); }
+
+  /// The next line that is not empty; nullopt at the end.
+  std::optional<std::string> line() {
+    leaveBytes();
+    while (const auto line = text_.line())
+      if (const std::string_view words = trimmed(*line); !words.empty()) return std::string(words);
+    return std::nullopt;
+  }
+  std::string requiredLine() {
+    auto words = line();
+    if (!words) fail("ends");
+    return std::move(*words);
+  }
+  /// A number in text, whatever the rest of the file is.
+  double textNumber() {
+    leaveBytes();
+    return text_.number();
+  }
+  /// Goes behind the line that words of text were read from: binary numbers follow.
+  void endLine() {
+    leaveBytes();
+    if (binary_) text_.line();
+  }
+
+  template <typename Stored>
+  Stored next() {
+    if (!binary_) {
+      const double number = text_.number();
+      if constexpr (std::is_integral_v<Stored>)
+        if (!(number >=
+                  static_cast<double>(std::is_signed_v<Stored> ? std::numeric_limits<Stored>::min() : 0) &&
+              number <= 0x1p53))
+          fail(fmt::format("has {} as a number of something", number));
+      return static_cast<Stored>(number);
+    }
+    if (bytes_at_ == 0) {
+      bytes_at_ = text_.offset();
+      used_ = buffer_.size();
+    }
+    if (buffer_.size() - used_ < sizeof(Stored)) refill(sizeof(Stored));
+    const auto value = loadStored<Stored>(&buffer_[used_], swap_);
+    used_ += sizeof(Stored);
+    bytes_at_ += sizeof(Stored);
+    return value;
+  }
+  /// Of a count in the file: version 2 has integers of 4 bytes, version 4 of 8.
+  uint64_t nextCount(bool wide) {
+    const int64_t count = wide || !binary_ ? next<int64_t>() : next<int32_t>();
+    if (count < 0 || static_cast<uint64_t>(count) > size()) fail(fmt::format("counts {} numbers", count));
+    return static_cast<uint64_t>(count);
+  }
+  uint64_t nextTag(bool wide) {
+    const int64_t tag = wide || !binary_ ? next<int64_t>() : next<int32_t>();
+    if (tag < 0) fail(fmt::format("has the number {}", tag));
+    return static_cast<uint64_t>(tag);
+  }
+
+  /// Goes behind the line "$EndNAME".
+  void skipTo(const std::string& end) {
+    leaveBytes();
+    uint64_t at = text_.offset();
+    std::vector<char> some;
+    while (at < size()) {
+      some.resize(static_cast<size_t>(std::min<uint64_t>(kTableAtOnce, size() - at)));
+      file_->readAt(at, std::as_writable_bytes(std::span(some)));
+      const size_t found = std::string_view(some.data(), some.size()).find(end);
+      if (found != std::string_view::npos) {
+        text_.seek(at + found + end.size());
+        text_.line();
+        return;
+      }
+      if (some.size() <= end.size()) break;
+      at += some.size() - end.size();
+    }
+    fail("has no " + end);
+  }
+  void seek(uint64_t offset) {
+    bytes_at_ = 0;
+    text_.seek(offset);
+  }
+
+ private:
+  void leaveBytes() {
+    if (bytes_at_ > 0) seek(bytes_at_);
+  }
+  void refill(size_t bytes) {
+    if (bytes_at_ > size() || size() - bytes_at_ < bytes) fail("ends");
+    buffer_.resize(static_cast<size_t>(std::min<uint64_t>(kTableAtOnce, size() - bytes_at_)));
+    file_->readAt(bytes_at_, std::span(buffer_));
+    used_ = 0;
+  }
+
+  std::shared_ptr<const PooledFile> file_;
+  TextReader text_;
+  bool binary_ = false, swap_ = false;
+  uint64_t bytes_at_ = 0;  // of the next binary number; 0: text is read
+  std::vector<std::byte> buffer_;
+  size_t used_ = 0;
+};
+
+// ---- numbers of nodes and elements ----
+
+/// The index of each number ("tag") of nodes or elements in the order of the file. Numbers that follow one another need nothing,
+/// others a table on disk.
+class TagTable {
+ public:
+  TagTable(const std::shared_ptr<SpoolFile>& spool, const std::string& file, const char* what)
+      : spool_(spool), tags_(spool), file_(file), what_(what) {}
+
+  void add(uint64_t tag) {
+    if (count_ == 0) first_ = last_ = tag;
+    in_order_ = in_order_ && tag == first_ + count_;
+    first_ = std::min(first_, tag);
+    last_ = std::max(last_, tag);
+    ++count_;
+    tags_.add(tag);
+  }
+  uint64_t count() const { return count_; }
+
+  void finish() {
+    const SpooledNumbers tags = tags_.finish();
+    if (in_order_ || count_ == 0) return;
+    if ((last_ - first_) / 8 > count_ + kTableAtOnce)
+      throw Error(
+          "{}: numbers its {} from {} to {}, of which it has {}; renumber them in Gmsh (Mesh.Renumber)",
+          file_, what_, first_, last_, count_);
+    NumberSpool<uint64_t> table(spool_);
+    std::vector<uint64_t> part, some;
+    for (uint64_t begin = first_; begin <= last_; begin += kTableAtOnce) {
+      part.assign(std::min(kTableAtOnce, last_ - begin + 1), kNowhere);
+      for (uint64_t n = 0; n < count_; n += some.size()) {
+        some.resize(std::min(kAtOnce, count_ - n));
+        tags.read(n, std::span(some));
+        for (size_t k = 0; k < some.size(); ++k)
+          if (some[k] >= begin && some[k] - begin < part.size()) part[some[k] - begin] = n + k;
+      }
+      for (const uint64_t index : part) table.add(index);
+    }
+    table_ = table.finish();
+  }
+
+  /// Replaces each tag by its index; kNowhere where there is none.
+  void replace(std::vector<uint64_t>& tags) const {
+    if (in_order_) {
+      for (uint64_t& tag : tags) tag = tag >= first_ && tag - first_ < count_ ? tag - first_ : kNowhere;
+      return;
+    }
+    std::vector<size_t> order(tags.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return tags[a] < tags[b]; });
+    std::vector<uint64_t> run;
+    for (size_t from = 0; from < order.size();) {
+      size_t to = from + 1;
+      while (to < order.size() && tags[order[to]] - tags[order[to - 1]] < kMaxGap) ++to;
+      const uint64_t begin = std::max(first_, tags[order[from]]), end = std::min(last_, tags[order[to - 1]]);
+      run.resize(begin <= end ? end - begin + 1 : 0);
+      table_.read(begin - first_, std::span(run));
+      for (; from < to; ++from) {
+        uint64_t& tag = tags[order[from]];
+        tag = tag >= begin && tag - begin < run.size() ? run[tag - begin] : kNowhere;
+      }
+    }
+  }
+
+  static constexpr uint64_t kNowhere = std::numeric_limits<uint64_t>::max();
+
+ private:
+  std::shared_ptr<SpoolFile> spool_;
+  NumberSpool<uint64_t> tags_;
+  SpooledNumbers table_;
+  std::string file_;
+  const char* what_;
+  bool in_order_ = true;
+  uint64_t first_ = 0, last_ = 0, count_ = 0;
+};
+
+// ---- the source ----
+
+class GmshSource final : public ElementSource {
+ public:
+  explicit GmshSource(const OpenGridOptions& options);
+
+ private:
+  /// Elements of one kind, one after another.
+  struct Block {
+    const Element* element = nullptr;
+    uint64_t count = 0, nodes = 0;  // nodes: of the first one, in nodes_
+  };
+  /// A section of values.
+  struct Data {
+    std::string name;
+    Centring centring = Centring::kNode;
+    double time = 0;
+    uint64_t components = 1, count = 0, offset = 0;
+  };
+  struct Scalar {
+    size_t field = 0;
+    int component = 0;
+  };
+  struct Field {
+    SpooledNumbers values;
+    uint64_t components = 1;
+  };
+
+  void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override;
+  void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override;
+  void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override;
+  void readFormat();
+  void readNodes();
+  void readElements();
+  void readElement(const Element& element, uint64_t tag, NumberSpool<uint64_t>& nodes);
+  void flushNodes(NumberSpool<uint64_t>& nodes);
+  const Element& elementOf(int type) const;
+  void readDataHeader(Centring centring);
+  void addFields(std::optional<uint32_t> time_step);
+  SpooledNumbers valuesOf(const std::vector<const Data*>& sections, uint64_t samples, const TagTable& tags);
+
+  std::shared_ptr<SpoolFile> place_spool_, node_spool_, value_spool_, tag_spool_, element_tag_spool_;
+  Reader reader_;
+  bool version4_ = true;
+  TagTable node_tags_, element_tags_;
+  SpooledNumbers places_, nodes_;
+  std::vector<Block> blocks_;
+  std::vector<uint64_t> pending_;  // tags of nodes
+  uint64_t cells_ = 0, left_out_ = 0;
+  bool has_nodes_ = false, has_elements_ = false;
+  std::vector<Data> data_;
+  std::vector<Field> fields_;
+  std::vector<Scalar> scalars_;  // [description_.scalars]
+};
+
+GmshSource::GmshSource(const OpenGridOptions& options)
+    : place_spool_(std::make_shared<SpoolFile>(options.temporary_folder)),
+      node_spool_(std::make_shared<SpoolFile>(options.temporary_folder)),
+      value_spool_(std::make_shared<SpoolFile>(options.temporary_folder)),
+      tag_spool_(std::make_shared<SpoolFile>(options.temporary_folder)),
+      element_tag_spool_(std::make_shared<SpoolFile>(options.temporary_folder)),
+      reader_(std::make_shared<const PooledFile>(std::make_shared<OpenFiles>(), options.grid)),
+      node_tags_(tag_spool_, options.grid.string(), "nodes"),
+      element_tags_(element_tag_spool_, options.grid.string(), "elements") {
+  readFormat();
+  std::set<std::string> left_out;
+  while (const auto section = reader_.line()) {
+    if (!section->starts_with('$'))
+      reader_.fail(fmt::format("has \"{}\" in the place of a section", printable(*section)));
+    const std::string name = section->substr(1);
+    if (name == "Nodes")
+      readNodes();
+    else if (name == "Elements")
+      readElements();
+    else if (name == "NodeData" || name == "ElementData")
+      readDataHeader(name == "NodeData" ? Centring::kNode : Centring::kCell);
+    else if (name == "ElementNodeData" || name == "ParametricElements")
+      left_out.insert(name);
+    reader_.skipTo("$End" + name);
+  }
+  if (!has_nodes_ || !has_elements_)
+    reader_.fail(fmt::format("has no ${}", has_nodes_ ? "Elements" : "Nodes"));
+  if (cells_ == 0)
+    throw Error("{}: has no elements with a volume; expected a mesh in three dimensions", reader_.name());
+  for (const std::string& name : left_out)
+    description_.warnings.push_back(fmt::format("left out: ${}", name));
+  if (left_out_ > 0)
+    description_.warnings.push_back(fmt::format("{} of an order above 2 {} drawn by their corners",
+                                                countText(left_out_, "element"), isOrAre(left_out_)));
+  description_.files = {reader_.name()};
+  description_.format =
+      fmt::format("Gmsh {}, {}", version4_ ? "4.1" : "2.2", reader_.isBinary() ? "binary" : "ASCII");
+  description_.coordinate_bytes = 8;
+  description_.pieces.push_back({"mesh", reader_.name(), node_tags_.count(), cells_});
+  addFields(options.time_step);
+}
+
+void GmshSource::readFormat() {
+  reader_.requiredLine();
+  const double version = reader_.textNumber(), binary = reader_.textNumber(), bytes = reader_.textNumber();
+  version4_ = version == 4.1;
+  if (!version4_ && version != 2 && version != 2.1 && version != 2.2)
+    throw Error(
+        "{}: is a Gmsh mesh of version {}; expected 4.1 or 2.2: save it so (gmsh FILE -save -format msh41 -o "
+        "OUT.msh)",
+        reader_.name(), version);
+  if (binary == 1) {
+    if (bytes != 8) reader_.fail(fmt::format("has numbers of {} bytes; expected 8", bytes));
+    reader_.setBinary(false);
+    reader_.endLine();
+    if (const auto one = reader_.next<int32_t>(); one != 1) {
+      if (byteSwapped(static_cast<uint32_t>(one)) != 1) reader_.fail("has no 1 to tell its byte order");
+      reader_.setBinary(true);
+    }
+  }
+  reader_.skipTo("$EndMeshFormat");
+}
+
+void GmshSource::readNodes() {
+  if (std::exchange(has_nodes_, true)) reader_.fail("has $Nodes twice");
+  NumberSpool<double> places(place_spool_);
+  const auto addPlace = [&](int parameters) {
+    for (int axis = 0; axis < 3; ++axis) places.add(reader_.next<double>());
+    for (int n = 0; n < parameters; ++n) reader_.next<double>();
+  };
+  if (version4_) {
+    const uint64_t blocks = reader_.nextCount(true);
+    for (int n = 0; n < 3; ++n) reader_.nextTag(true);
+    for (uint64_t block = 0; block < blocks; ++block) {
+      const auto dimension = reader_.next<int32_t>();
+      reader_.next<int32_t>();
+      const auto parametric = reader_.next<int32_t>();
+      if (dimension < 0 || dimension > 3)
+        reader_.fail(fmt::format("has an entity of {} dimensions", dimension));
+      const uint64_t count = reader_.nextCount(true);
+      for (uint64_t n = 0; n < count; ++n) node_tags_.add(reader_.nextTag(true));
+      for (uint64_t n = 0; n < count; ++n) addPlace(parametric != 0 ? dimension : 0);
+    }
+  } else {
+    const double count = reader_.textNumber();
+    if (!(count >= 0 && count <= static_cast<double>(reader_.size())))
+      reader_.fail(fmt::format("counts {} nodes", count));
+    reader_.endLine();
+    for (uint64_t n = 0; n < static_cast<uint64_t>(count); ++n) {
+      node_tags_.add(reader_.nextTag(false));
+      addPlace(0);
+    }
+  }
+  node_tags_.finish();
+  places_ = places.finish();
+}
+
+const Element& GmshSource::elementOf(int type) const {
+  for (const Element& element : kElements)
+    if (element.type == type) return element;
+  throw Error("{}: has elements of type {}, which is not read; convert it (meshio convert FILE mesh.vtu)",
+              reader_.name(), type);
+}
+
+/// Adds an element with a volume, or passes over another one.
+void GmshSource::readElement(const Element& element, uint64_t tag, NumberSpool<uint64_t>& nodes) {
+  if (element.kind == CellKind::kNone) {
+    for (size_t n = 0; n < element.nodes; ++n) reader_.nextTag(version4_);
+    return;
+  }
+  if (blocks_.empty() || blocks_.back().element != &element) {
+    if (blocks_.size() == kMaxBlocks)
+      throw Error(
+          "{}: has its elements in more than {} lists of one kind; sort them by kind (save it as version "
+          "4.1)",
+          reader_.name(), kMaxBlocks);
+    blocks_.push_back({&element, 0, nodes.size() + pending_.size()});
+  }
+  ++blocks_.back().count;
+  ++cells_;
+  left_out_ += isOfHigherOrder(element) ? 1 : 0;
+  has_curved_cells_ |= isCurved(element);
+  element_tags_.add(tag);
+  for (size_t n = 0; n < element.nodes; ++n) pending_.push_back(reader_.nextTag(version4_));
+  if (pending_.size() >= kAtOnce) flushNodes(nodes);
+}
+
+void GmshSource::flushNodes(NumberSpool<uint64_t>& nodes) {
+  node_tags_.replace(pending_);
+  for (const uint64_t node : pending_) nodes.add(node);
+  pending_.clear();
+}
+
+void GmshSource::readElements() {
+  if (!has_nodes_) reader_.fail("has $Elements before $Nodes");
+  if (std::exchange(has_elements_, true)) reader_.fail("has $Elements twice");
+  NumberSpool<uint64_t> nodes(node_spool_);
+  if (version4_) {
+    const uint64_t blocks = reader_.nextCount(true);
+    for (int n = 0; n < 3; ++n) reader_.nextTag(true);
+    for (uint64_t block = 0; block < blocks; ++block) {
+      reader_.next<int32_t>();
+      reader_.next<int32_t>();
+      const Element& element = elementOf(reader_.next<int32_t>());
+      const uint64_t count = reader_.nextCount(true);
+      for (uint64_t n = 0; n < count; ++n) readElement(element, reader_.nextTag(true), nodes);
+    }
+  } else {
+    const double count = reader_.textNumber();
+    if (!(count >= 0 && count <= static_cast<double>(reader_.size())))
+      reader_.fail(fmt::format("counts {} elements", count));
+    reader_.endLine();
+    for (uint64_t n = 0; n < static_cast<uint64_t>(count);) {
+      // In binary elements of one kind follow their header; in text each one has its own.
+      uint64_t tag = reader_.isBinary() ? 0 : reader_.nextTag(false);
+      const Element& element = elementOf(reader_.next<int32_t>());
+      const uint64_t some = reader_.isBinary() ? reader_.nextCount(false) : 1;
+      const uint64_t tags = reader_.nextCount(false);
+      if (some == 0) reader_.fail("has a list of no elements");
+      for (uint64_t k = 0; k < some; ++k, ++n) {
+        if (reader_.isBinary()) tag = reader_.nextTag(false);
+        for (uint64_t t = 0; t < tags; ++t) reader_.next<int32_t>();
+        readElement(element, tag, nodes);
+      }
+    }
+  }
+  flushNodes(nodes);
+  nodes_ = nodes.finish();
+  element_tags_.finish();
+}
+
+/// Reads what a section of values is: names, real and whole numbers, in text.
+void GmshSource::readDataHeader(Centring centring) {
+  Data data;
+  data.centring = centring;
+  const auto countOf = [&](const char* what) {
+    const double count = reader_.textNumber();
+    if (!(count >= 0 && count <= 1000)) reader_.fail(fmt::format("counts {} {}", count, what));
+    return static_cast<size_t>(count);
+  };
+  for (size_t n = countOf("names"); n > 0; --n) {
+    const std::string words = reader_.requiredLine();
+    if (data.name.empty()) data.name = words;
+  }
+  std::erase(data.name, '"');
+  const size_t reals = countOf("times");
+  for (size_t n = 0; n < reals; ++n)
+    if (const double real = reader_.textNumber(); n == 0) data.time = real;
+  const size_t integers = countOf("sizes");
+  std::vector<double> sizes(std::max<size_t>(3, integers));
+  for (size_t n = 0; n < integers; ++n) sizes[n] = reader_.textNumber();
+  if (integers < 3 || !(sizes[1] >= 1 && sizes[1] <= 9) ||
+      !(sizes[2] >= 0 && sizes[2] <= static_cast<double>(reader_.size())))
+    reader_.fail(fmt::format("has values of {} components for {} samples", sizes[1], sizes[2]));
+  reader_.endLine();
+  data.components = static_cast<uint64_t>(sizes[1]);
+  data.count = static_cast<uint64_t>(sizes[2]);
+  data.offset = reader_.offset();
+  if (reader_.isBinary() &&
+      data.count * (4 + 8 * data.components) > reader_.size() - std::min(reader_.size(), data.offset))
+    reader_.fail("ends within values");
+  if (reader_.isBinary()) reader_.seek(data.offset + data.count * (4 + 8 * data.components));
+  if (data.name.empty()) data.name = centring == Centring::kNode ? "NodeData" : "ElementData";
+  if (data_.size() == kMaxData) reader_.fail(fmt::format("has more than {} sections of values", kMaxData));
+  data_.push_back(std::move(data));
+}
+
+void GmshSource::addFields(std::optional<uint32_t> time_step) {
+  std::set<double> times;
+  for (const Data& data : data_) times.insert(data.time);
+  if (times.size() > 1) description_.times.assign(times.begin(), times.end());
+  description_.time_step = chosenTimeStep(reader_.name(), description_.times, time_step);
+  const double time = times.size() > 1 ? description_.times[description_.time_step] : 0;
+  std::map<std::pair<std::string, Centring>, std::vector<const Data*>> of_name;
+  std::vector<std::pair<std::string, Centring>> names;
+  for (const Data& data : data_) {
+    if (times.size() > 1 && data.time != time) continue;
+    auto& sections = of_name[{data.name, data.centring}];
+    if (sections.empty()) names.emplace_back(data.name, data.centring);
+    if (!sections.empty() && sections.front()->components != data.components)
+      throw Error("{}: has {} with {} and with {} components", reader_.name(), data.name,
+                  sections.front()->components, data.components);
+    sections.push_back(&data);
+  }
+  ScalarList list(description_);
+  for (const auto& name : names) {
+    const auto& sections = of_name[name];
+    const bool nodes = name.second == Centring::kNode;
+    const uint64_t components = sections.front()->components;
+    size_t number = 0;
+    forEachComponent(components, [&](const std::string& suffix, int component) {
+      list.add(namesOfComponent(name.first, suffix, name.second, ++number), name.second);
+      scalars_.push_back({fields_.size(), component});
+    });
+    fields_.push_back(
+        {valuesOf(sections, nodes ? node_tags_.count() : cells_, nodes ? node_tags_ : element_tags_),
+         components});
+  }
+}
+
+/// Spools the values of all samples, in their order: NaN where the sections have none.
+SpooledNumbers GmshSource::valuesOf(const std::vector<const Data*>& sections, uint64_t samples,
+                                    const TagTable& tags) {
+  const uint64_t components = sections.front()->components;
+  NumberSpool<double> spool(value_spool_);
+  std::vector<double> part, some;
+  std::vector<uint64_t> numbers;
+  for (uint64_t begin = 0; begin < samples; begin += kTableAtOnce) {
+    const uint64_t count = std::min(kTableAtOnce, samples - begin);
+    part.assign(count * components, kNaN);
+    for (const Data* data : sections) {
+      reader_.seek(data->offset);
+      for (uint64_t n = 0; n < data->count; n += numbers.size()) {
+        numbers.resize(std::min(kAtOnce, data->count - n));
+        some.resize(numbers.size() * components);
+        for (size_t k = 0; k < numbers.size(); ++k) {
+          numbers[k] = reader_.nextTag(false);
+          for (uint64_t c = 0; c < components; ++c) some[k * components + c] = reader_.next<double>();
+        }
+        tags.replace(numbers);
+        for (size_t k = 0; k < numbers.size(); ++k)
+          if (numbers[k] >= begin && numbers[k] - begin < count)
+            std::copy_n(&some[k * components], components, &part[(numbers[k] - begin) * components]);
+      }
+    }
+    for (const double value : part) spool.add(value);
+  }
+  return spool.finish();
+}
+
+void GmshSource::readPlaces(uint32_t, uint64_t first, uint64_t count, const Places& to) const {
+  std::vector<double> places(3 * count);
+  places_.read(3 * first, std::span(places));
+  for (size_t n = 0; n < places.size(); ++n) to.axes[n % 3][n / 3] = places[n];
+}
+
+void GmshSource::appendCells(uint32_t, uint64_t first, uint64_t count, MeshCells& out) const {
+  std::vector<uint64_t> nodes;
+  std::array<uint64_t, 27> turned{};
+  forEachPartOfLists(
+      blocks_, first, count, [](const Block& block) { return block.count; },
+      [&](const PartOfList& part) {
+        const Element& element = *blocks_[part.list].element;
+        nodes.resize(part.count * element.nodes);
+        nodes_.read(blocks_[part.list].nodes + part.first * element.nodes, std::span(nodes));
+        for (uint64_t n = 0; n < part.count; ++n) {
+          const auto of_cell = std::span<const uint64_t>(nodes).subspan(n * element.nodes, element.nodes);
+          if (!isCurved(element)) {
+            out.append(element.kind, of_cell.first(cornersOf(element.kind)));
+            continue;
+          }
+          for (size_t k = 0; k < element.nodes; ++k) turned[k] = of_cell[element.order[k]];
+          appendCurved(element.kind, std::span(turned).first(element.nodes), out);
+        }
+      });
+}
+
+void GmshSource::readValues(uint32_t, uint32_t scalar, uint64_t first, std::span<float> to) const {
+  const auto [number, component] = scalars_[scalar];
+  const Field& field = fields_[number];
+  std::vector<double> values(to.size() * field.components);
+  field.values.read(first * field.components, std::span(values));
+  for (size_t n = 0; n < to.size(); ++n) {
+    const std::span<const double> tuple = std::span(values).subspan(n * field.components, field.components);
+    double value = 0;
+    if (component == kMagnitude) {
+      for (const double one : tuple) value += one * one;
+      value = std::sqrt(value);
+    } else {
+      value = tuple[static_cast<size_t>(component)];
+    }
+    to[n] = convertedTo<float>(value);
+  }
+}
+
+}  // namespace
+
+bool isGmsh(const InputFile& file) {
+  std::string begin(std::string_view("$MeshFormat").size(), '\0');
+  if (file.size() < begin.size()) return false;
+  file.readAt(0, std::span(begin.data(), begin.size()));
+  return begin == "$MeshFormat";
+}
+
+std::unique_ptr<DataSource> openGmsh(const OpenGridOptions& options) {
+  return std::make_unique<GmshSource>(options);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,19 @@
+// Meshes of Gmsh (.msh), versions 4.1 and 2.2, in text or binary, with values at nodes ($NodeData) and in elements
+// ($ElementData), of several steps.
+#pragma once
+
+#include <memory>
+
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+/// Whether it begins with $MeshFormat.
+bool isGmsh(const InputFile& file);
+
+/// Reads the mesh and spools it: positions, nodes of the elements, values of the time step, 8 bytes each. Elements without a volume are
+/// left out. Those of second order are curved; of higher order they are drawn by their corners, with a warning. Throws Error.
+std::unique_ptr<DataSource> openGmsh(const OpenGridOptions& options);
+
+}  // namespace curvisplat
