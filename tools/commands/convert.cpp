@@ -275,10 +275,10 @@ void addConvert(CLI::App& app) {
   auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert a grid to a splat cache, in bounded memory");
   command
-      ->add_option(
-          "GRID", arguments->grid.grid,
-          "Grid file (PLOT3D, VTK, CGNS, NetCDF, EnSight, Tecplot, XDMF, Exodus, Fluent, Gmsh or SU2), or the "
-          "folder of an OpenFOAM case or a Zarr store")
+      ->add_option("GRID", arguments->grid.grid,
+                   "Grid file (PLOT3D, VTK, CGNS, NetCDF, EnSight, Tecplot, XDMF, Exodus, Fluent, Gmsh or "
+                   "SU2), or the "
+                   "folder of an OpenFOAM case or a Zarr store")
       ->required();
   command->add_option("SOLUTION", arguments->grid.solutions,
                       "Further files of the grid: PLOT3D solution (Q) and function files; NetCDF, VTK or "

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <span>
@@ -20,6 +19,8 @@
 #include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/gmsh/gmsh_reader.h"
+#include "preprocess/formats/gmsh/gmsh_tags.h"
 #include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
@@ -28,7 +29,7 @@ namespace curvisplat {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr uint64_t kAtOnce = 65536, kTableAtOnce = 1 << 20, kMaxGap = 512;
+constexpr uint64_t kAtOnce = 65536, kSamplesAtOnce = 1 << 20;
 constexpr size_t kMaxBlocks = 1'000'000, kMaxData = 100'000;
 
 // ---- kinds of elements ----
@@ -94,202 +95,6 @@ bool isOfHigherOrder(const Element& element) {
   return !isCurved(element) && element.nodes > cornersOf(element.kind);
 }
 
-// ---- the file ----
-
-/// The words of a file, and its numbers, which are text or binary.
-class Reader {
- public:
-  explicit Reader(std::shared_ptr<const PooledFile> file)
-      : file_(std::move(file)), text_(file_, 0, file_->size()) {}
-
-  std::string name() const { return file_->name(); }
-  uint64_t size() const { return file_->size(); }
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error("{}: {} before byte {}; it is truncated or damaged: write it again", name(), what, offset());
-  }
-
-  void setBinary(bool swap) {
-    binary_ = true;
-    swap_ = swap;
-  }
-  bool isBinary() const { return binary_; }
-  uint64_t offset() const { return bytes_at_ > 0 ? bytes_at_ : text_.offset(); }
-
-  /// The next line that is not empty; nullopt at the end.
-  std::optional<std::string> line() {
-    leaveBytes();
-    while (const auto line = text_.line())
-      if (const std::string_view words = trimmed(*line); !words.empty()) return std::string(words);
-    return std::nullopt;
-  }
-  std::string requiredLine() {
-    auto words = line();
-    if (!words) fail("ends");
-    return std::move(*words);
-  }
-  /// A number in text, whatever the rest of the file is.
-  double textNumber() {
-    leaveBytes();
-    return text_.number();
-  }
-  /// Goes behind the line that words of text were read from: binary numbers follow.
-  void endLine() {
-    leaveBytes();
-    if (binary_) text_.line();
-  }
-
-  template <typename Stored>
-  Stored next() {
-    if (!binary_) {
-      const double number = text_.number();
-      if constexpr (std::is_integral_v<Stored>)
-        if (!(number >=
-                  static_cast<double>(std::is_signed_v<Stored> ? std::numeric_limits<Stored>::min() : 0) &&
-              number <= 0x1p53))
-          fail(fmt::format("has {} as a number of something", number));
-      return static_cast<Stored>(number);
-    }
-    if (bytes_at_ == 0) {
-      bytes_at_ = text_.offset();
-      used_ = buffer_.size();
-    }
-    if (buffer_.size() - used_ < sizeof(Stored)) refill(sizeof(Stored));
-    const auto value = loadStored<Stored>(&buffer_[used_], swap_);
-    used_ += sizeof(Stored);
-    bytes_at_ += sizeof(Stored);
-    return value;
-  }
-  /// Of a count in the file: version 2 has integers of 4 bytes, version 4 of 8.
-  uint64_t nextCount(bool wide) {
-    const int64_t count = wide || !binary_ ? next<int64_t>() : next<int32_t>();
-    if (count < 0 || static_cast<uint64_t>(count) > size()) fail(fmt::format("counts {} numbers", count));
-    return static_cast<uint64_t>(count);
-  }
-  uint64_t nextTag(bool wide) {
-    const int64_t tag = wide || !binary_ ? next<int64_t>() : next<int32_t>();
-    if (tag < 0) fail(fmt::format("has the number {}", tag));
-    return static_cast<uint64_t>(tag);
-  }
-
-  /// Goes behind the line "$EndNAME".
-  void skipTo(const std::string& end) {
-    leaveBytes();
-    uint64_t at = text_.offset();
-    std::vector<char> some;
-    while (at < size()) {
-      some.resize(static_cast<size_t>(std::min<uint64_t>(kTableAtOnce, size() - at)));
-      file_->readAt(at, std::as_writable_bytes(std::span(some)));
-      const size_t found = std::string_view(some.data(), some.size()).find(end);
-      if (found != std::string_view::npos) {
-        text_.seek(at + found + end.size());
-        text_.line();
-        return;
-      }
-      if (some.size() <= end.size()) break;
-      at += some.size() - end.size();
-    }
-    fail("has no " + end);
-  }
-  void seek(uint64_t offset) {
-    bytes_at_ = 0;
-    text_.seek(offset);
-  }
-
- private:
-  void leaveBytes() {
-    if (bytes_at_ > 0) seek(bytes_at_);
-  }
-  void refill(size_t bytes) {
-    if (bytes_at_ > size() || size() - bytes_at_ < bytes) fail("ends");
-    buffer_.resize(static_cast<size_t>(std::min<uint64_t>(kTableAtOnce, size() - bytes_at_)));
-    file_->readAt(bytes_at_, std::span(buffer_));
-    used_ = 0;
-  }
-
-  std::shared_ptr<const PooledFile> file_;
-  TextReader text_;
-  bool binary_ = false, swap_ = false;
-  uint64_t bytes_at_ = 0;  // of the next binary number; 0: text is read
-  std::vector<std::byte> buffer_;
-  size_t used_ = 0;
-};
-
-// ---- numbers of nodes and elements ----
-
-/// The index of each number ("tag") of nodes or elements in the order of the file. Numbers that follow one another need nothing,
-/// others a table on disk.
-class TagTable {
- public:
-  TagTable(const std::shared_ptr<SpoolFile>& spool, const std::string& file, const char* what)
-      : spool_(spool), tags_(spool), file_(file), what_(what) {}
-
-  void add(uint64_t tag) {
-    if (count_ == 0) first_ = last_ = tag;
-    in_order_ = in_order_ && tag == first_ + count_;
-    first_ = std::min(first_, tag);
-    last_ = std::max(last_, tag);
-    ++count_;
-    tags_.add(tag);
-  }
-  uint64_t count() const { return count_; }
-
-  void finish() {
-    const SpooledNumbers tags = tags_.finish();
-    if (in_order_ || count_ == 0) return;
-    if ((last_ - first_) / 8 > count_ + kTableAtOnce)
-      throw Error(
-          "{}: numbers its {} from {} to {}, of which it has {}; renumber them in Gmsh (Mesh.Renumber)",
-          file_, what_, first_, last_, count_);
-    NumberSpool<uint64_t> table(spool_);
-    std::vector<uint64_t> part, some;
-    for (uint64_t begin = first_; begin <= last_; begin += kTableAtOnce) {
-      part.assign(std::min(kTableAtOnce, last_ - begin + 1), kNowhere);
-      for (uint64_t n = 0; n < count_; n += some.size()) {
-        some.resize(std::min(kAtOnce, count_ - n));
-        tags.read(n, std::span(some));
-        for (size_t k = 0; k < some.size(); ++k)
-          if (some[k] >= begin && some[k] - begin < part.size()) part[some[k] - begin] = n + k;
-      }
-      for (const uint64_t index : part) table.add(index);
-    }
-    table_ = table.finish();
-  }
-
-  /// Replaces each tag by its index; kNowhere where there is none.
-  void replace(std::vector<uint64_t>& tags) const {
-    if (in_order_) {
-      for (uint64_t& tag : tags) tag = tag >= first_ && tag - first_ < count_ ? tag - first_ : kNowhere;
-      return;
-    }
-    std::vector<size_t> order(tags.size());
-    std::iota(order.begin(), order.end(), size_t{0});
-    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return tags[a] < tags[b]; });
-    std::vector<uint64_t> run;
-    for (size_t from = 0; from < order.size();) {
-      size_t to = from + 1;
-      while (to < order.size() && tags[order[to]] - tags[order[to - 1]] < kMaxGap) ++to;
-      const uint64_t begin = std::max(first_, tags[order[from]]), end = std::min(last_, tags[order[to - 1]]);
-      run.resize(begin <= end ? end - begin + 1 : 0);
-      table_.read(begin - first_, std::span(run));
-      for (; from < to; ++from) {
-        uint64_t& tag = tags[order[from]];
-        tag = tag >= begin && tag - begin < run.size() ? run[tag - begin] : kNowhere;
-      }
-    }
-  }
-
-  static constexpr uint64_t kNowhere = std::numeric_limits<uint64_t>::max();
-
- private:
-  std::shared_ptr<SpoolFile> spool_;
-  NumberSpool<uint64_t> tags_;
-  SpooledNumbers table_;
-  std::string file_;
-  const char* what_;
-  bool in_order_ = true;
-  uint64_t first_ = 0, last_ = 0, count_ = 0;
-};
-
 // ---- the source ----
 
 class GmshSource final : public ElementSource {
@@ -329,12 +134,12 @@ class GmshSource final : public ElementSource {
   const Element& elementOf(int type) const;
   void readDataHeader(Centring centring);
   void addFields(std::optional<uint32_t> time_step);
-  SpooledNumbers valuesOf(const std::vector<const Data*>& sections, uint64_t samples, const TagTable& tags);
+  SpooledNumbers valuesOf(const std::vector<const Data*>& sections, uint64_t samples, const GmshTags& tags);
 
   std::shared_ptr<SpoolFile> place_spool_, node_spool_, value_spool_, tag_spool_, element_tag_spool_;
-  Reader reader_;
+  GmshReader reader_;
   bool version4_ = true;
-  TagTable node_tags_, element_tags_;
+  GmshTags node_tags_, element_tags_;
   SpooledNumbers places_, nodes_;
   std::vector<Block> blocks_;
   std::vector<uint64_t> pending_;  // tags of nodes
@@ -587,13 +392,13 @@ void GmshSource::addFields(std::optional<uint32_t> time_step) {
 
 /// Spools the values of all samples, in their order: NaN where the sections have none.
 SpooledNumbers GmshSource::valuesOf(const std::vector<const Data*>& sections, uint64_t samples,
-                                    const TagTable& tags) {
+                                    const GmshTags& tags) {
   const uint64_t components = sections.front()->components;
   NumberSpool<double> spool(value_spool_);
   std::vector<double> part, some;
   std::vector<uint64_t> numbers;
-  for (uint64_t begin = 0; begin < samples; begin += kTableAtOnce) {
-    const uint64_t count = std::min(kTableAtOnce, samples - begin);
+  for (uint64_t begin = 0; begin < samples; begin += kSamplesAtOnce) {
+    const uint64_t count = std::min(kSamplesAtOnce, samples - begin);
     part.assign(count * components, kNaN);
     for (const Data* data : sections) {
       reader_.seek(data->offset);

@@ -1,0 +1,49 @@
+// The numbers ("tags") of nodes or elements of a Gmsh file, which may be in any order.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "preprocess/formats/common/spool_file.h"
+
+namespace curvisplat {
+
+/// The index of each number ("tag") of nodes or elements in the order of the file. Numbers that follow one another need nothing,
+/// others a table on disk.
+class GmshTags {
+ public:
+  GmshTags(const std::shared_ptr<SpoolFile>& spool, const std::string& file, const char* what)
+      : spool_(spool), tags_(spool), file_(file), what_(what) {}
+
+  void add(uint64_t tag) {
+    if (count_ == 0) first_ = last_ = tag;
+    in_order_ = in_order_ && tag == first_ + count_;
+    first_ = std::min(first_, tag);
+    last_ = std::max(last_, tag);
+    ++count_;
+    tags_.add(tag);
+  }
+  uint64_t count() const { return count_; }
+
+  /// All tags have been added. Throws Error if they are too far apart for a table.
+  void finish();
+
+  /// Replaces each tag by its index; kNowhere where there is none. Any thread, after finish().
+  void replace(std::vector<uint64_t>& tags) const;
+
+  static constexpr uint64_t kNowhere = std::numeric_limits<uint64_t>::max();
+
+ private:
+  std::shared_ptr<SpoolFile> spool_;
+  NumberSpool<uint64_t> tags_;
+  SpooledNumbers table_;
+  std::string file_;
+  const char* what_;
+  bool in_order_ = true;
+  uint64_t first_ = 0, last_ = 0, count_ = 0;
+};
+
+}  // namespace curvisplat
