@@ -67,8 +67,8 @@ struct FrameOptions {
   double low_pass_px2 = kLowPass;  // λ: added to the diagonal of S₂ (DESIGN.md, "Projection"), px²
   unsigned threads = 0;            // that compute at a time; 0: one per core
   uint64_t memory_bytes = 512 << 20;
-  // Of a graphics card's memory, for bricks that stay there and what they are drawn as. None: three quarters of what the card
-  // has free. 0: all splats are projected by the processor.
+  // The memory of a graphics card for bricks that stay there, and for what they are drawn as. None: three quarters of what
+  // the card has free. 0: all splats are projected by the processor.
   std::optional<uint64_t> card_memory_bytes;
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them

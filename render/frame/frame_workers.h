@@ -29,7 +29,7 @@
 
 namespace curvisplat {
 
-/// What is left of a part to the workers: all of it, or what a BrickStore does not draw of it.
+/// How much of a part is left to the workers: all of it, or what a BrickStore does not draw of it.
 enum class LeftToWorkers : uint8_t { kAll, kPieces, kNothing };
 
 /// The constant inputs that all workers of a frame share. Must outlive the frame.

@@ -237,7 +237,7 @@ void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& ke
   gl_.Uniform1f(projecting.uniform("largest_scalar"), largest_scalar);
   const CardBuffer* const buffers[] = {&splats, &words_, &parts_, &groups_, &fates_, &frames_};
   for (GLuint binding = 0; binding < std::size(buffers); ++binding) buffers[binding]->bind(binding);
-  gl_.DispatchCompute(std::min(count, kMostGroups), (count + kMostGroups - 1) / kMostGroups, 1);
+  gl_.DispatchCompute(std::min(count, kMaxGroups), (count + kMaxGroups - 1) / kMaxGroups, 1);
   gl_.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   gl_.check("projecting bricks");
 }

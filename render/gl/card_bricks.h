@@ -21,7 +21,7 @@ class CardBricks {
 
   /// Compiles what is otherwise compiled when it is first needed. Throws Error where the driver refuses it.
   void compile();
-  /// As BrickStore's.
+  /// These are BrickStore's.
   void open(uint64_t content);
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes);
   bool has(uint32_t brick) const;
@@ -32,7 +32,7 @@ class CardBricks {
   /// has those of the frame.
   void project(const ProjectionSettings& settings, const DepthKeys& keys, std::span<const StoredPart> parts,
                const SplatTables& tables, float largest_scalar, const CardBuffer& splats);
-  /// Of the last project(); waits for it.
+  /// The counts of the last project(), for which it waits.
   ProjectionCounts counts() const;
   uint64_t cardBytes() const { return words_.bytes() + parts_.bytes() + groups_.bytes(); }
 

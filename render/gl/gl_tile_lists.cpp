@@ -66,7 +66,7 @@ void GlTileLists::list(const ListedSplats& splats, const CardTiles& tiles, const
   bind();
   tiles.closed->bind(3);
   const uint32_t groups = groupsOf(splats.count, kListThreads);
-  dispatch(std::min(groups, kMostGroups), groupsOf(groups, kMostGroups));
+  dispatch(std::min(groups, kMaxGroups), groupsOf(groups, kMaxGroups));
 }
 
 void GlTileLists::scan(const CardBuffer& sums, const CardBuffer& totals, uint32_t rows,

@@ -42,7 +42,7 @@ uint64_t defaultBytesOf(const GlFunctions& gl) {
   return uint64_t{768} << 20;
 }
 
-/// What fills the gap before a batch's first element: it is no splat, and no shader draws it.
+/// An element that fills the gap before a batch's first: it is no splat, and no shader draws it.
 const ScreenSplat kNoSplat = ScreenDepth{}.record();
 
 /// The last key that the splat has in any tile, or a later one.

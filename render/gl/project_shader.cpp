@@ -87,7 +87,7 @@ vec2 planeOf(vec3 b0, vec3 b1, vec3 q) {
   return leans ? min(1.0, STEEPEST / steep) * slope : vec2(0.0);
 }
 
-// As GrowthBlock::skewOf(): `a0` to `a2` are A's columns on the screen.
+// This is GrowthBlock::skewOf(); `a0` to `a2` are A's columns on the screen.
 uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
   if (code == 0u) return 0u;
   vec4 t = vec4(0.0);
@@ -104,7 +104,7 @@ uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
   return uint(steps.x & 255) | uint(steps.y & 255) << 8 | uint(steps.z & 255) << 16 | uint(steps.w & 255) << 24;
 }
 
-// As LocalLight::of(): diffuse and specular. `towards_viewer` has unit length.
+// This is LocalLight::of(): diffuse and specular. `towards_viewer` has unit length.
 vec2 litBy(vec3 w, vec3 axis, vec3 shear, vec3 towards_viewer) {
   vec3 g;
   g.z = w.z / axis.z;
@@ -125,7 +125,7 @@ vec2 litBy(vec3 w, vec3 axis, vec3 shear, vec3 towards_viewer) {
   return vec2(1.0 - strength + strength * (light.x + light.y * facing), strength * light.z * shine);
 }
 
-// As packLit().
+// This is packLit().
 float withLight(float half_width, vec2 by) {
   uint bits = floatBitsToUint(max(half_width, 1.17549435e-38)) & 0xffff0000u;
   uvec2 shares = uvec2(clamp(by, 0.0, 1.0) * vec2(511.0, 127.0) + 0.5);

@@ -21,7 +21,7 @@ struct ShaderPart {
   uint32_t first, last;                                       // KeyRange
   float x, y;                                                 // OrthographicMap
   float origin_x, origin_y, origin_z, from_base, order_base;  // PerspectiveMap
-  float eye_x, eye_y, eye_z;  // LocalLight, in perspective
+  float eye_x, eye_y, eye_z;                                  // LocalLight, in perspective
 };
 static_assert(sizeof(ShaderPart) == 64);
 

@@ -19,7 +19,7 @@ uint sumOf(uint a, uint b) {
   return a + b < a ? 0xffffffffu : a + b;
 }
 
-// What all threads wrote to shared variables is there for all of them.
+// All threads see after this call what the others have written to shared variables.
 void meet() {
   memoryBarrierShared();
   barrier();
@@ -53,7 +53,7 @@ void main() {
 }
 )";
 
-// Where the entries of a tile lie: a chunk of tiles after the other, and in it a tile after the other.
+// Entries lie a chunk of tiles after the other, and in it a tile after the other.
 constexpr const char* kPlaces = R"(
 layout(std430, binding = 1) PLACES buffer Ends { uint ends[]; };  // [tile of the box] where its entries end, in its chunk
 layout(std430, binding = 2) readonly buffer Chunks { uint chunks[]; };  // [chunk] where its entries begin
@@ -203,7 +203,7 @@ std::string tileListShader(TileListStep step) {
       "{2}u\n#define CHUNK {3}u\n"
       "#define PLACES {4}\n#define SUPPORT {5:.9g}\n#define MAX_STEPS {6:.1f}\nlayout(local_size_x = {0}) "
       "in;\n{7}{8}",
-      sorts ? kSortThreads : kListThreads, kMostGroups, kSortedAtOnce, kTilesAChunk, sorts ? "readonly" : "",
+      sorts ? kSortThreads : kListThreads, kMaxGroups, kSortedAtOnce, kTilesAChunk, sorts ? "readonly" : "",
       static_cast<float>(kKernelSupport), kMaxSteps, step == TileListStep::kScan ? "" : kPlaces, body);
 }
 

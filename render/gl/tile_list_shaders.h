@@ -15,14 +15,14 @@ enum class TileListStep {
 };
 
 inline constexpr uint32_t kListThreads = 256, kSortThreads = 128;
-inline constexpr uint32_t kMostGroups = 32768;  // along x; every OpenGL has 65535
+inline constexpr uint32_t kMaxGroups = 32768;  // along x; every OpenGL has 65535
 /// Tiles whose entries are added up by one group.
 inline constexpr uint32_t kTilesAChunk = 8 * kListThreads;
 /// Entries that are sorted in shared memory; more in the card's, which takes longer.
 inline constexpr uint32_t kSortedAtOnce = 1024;
 
 std::string tileListShader(TileListStep step);
-/// For other shaders: uvec2 rangeOf(uint tile), where in the lists a tile's entries begin and end, by the buffers 1 and 2.
+/// Declares `uvec2 rangeOf(uint tile)` for other shaders: where a tile's entries begin and end, by the buffers 1 and 2.
 std::string tileRanges();
 
 }  // namespace curvisplat

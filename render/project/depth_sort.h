@@ -55,7 +55,7 @@ class DepthKeys {
     int32_t base;
     float steps, steps_a_pixel, inverse_base;
   };
-  /// What setKeys() computes in double precision, of a brick.
+  /// Returns what setKeys() computes of a brick in double precision.
   Linear linear(const glm::dvec3& cell_min) const;
 
  private:

@@ -77,7 +77,7 @@ class Painter {
   /// splats whose depth differs between tiles (leans(), tile_key.h) are blended in each tile's own order. The
   /// memory may be used again when the call returns.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
-  /// Where bricks may stay and be projected; null: the painter has no such place.
+  /// Returns the place where bricks may stay and be projected; null: the painter has none.
   virtual BrickStore* store() { return nullptr; }
   /// Whether all splats drawn from now on whose footprints lie in `box` would be hidden. The picture's bits
   /// do not depend on whether they are drawn. Any thread may ask between begin() and end().

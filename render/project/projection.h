@@ -98,7 +98,7 @@ class BrickProjector {
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
 
-  /// From now on only splats with a border code are projected: the others are drawn from a BrickStore.
+  /// Lets only splats with a border code be projected from now on: the others are drawn from a BrickStore.
   void setOnlyPieces(bool only_pieces) { only_pieces_ = only_pieces; }
 
   /// Leaves out what touches none of the tiles. To be called after project(): how splats are cut must not
