@@ -77,9 +77,7 @@ bool CardBricks::has(uint32_t brick) const {
 
 size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
   ++frame_;
-  GLint64 most = 0;
-  gl_.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
-  const auto largest = static_cast<uint64_t>(most);
+  const uint64_t largest = CardBuffer::largest(gl_);
   uint64_t stored = 0, drawn = 0;
   size_t count = 0;
   for (; count < parts.size(); ++count) {
@@ -91,11 +89,18 @@ size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
     drawn = with_drawn;
   }
   parts = parts.first(count);
-  if (count == 0 || place(parts, words_.bytes() / kWordBytes)) return count;
+  const bool is_within = words_.bytes() + drawn <= bytes;
+  if (is_within && place(parts, words_.bytes() / kWordBytes)) return count;
   bricks_.clear();
   by_place_.clear();
+  if (!is_within) words_.release();
+  if (count == 0) return 0;
   const uint64_t wanted = std::min({largest, bytes - drawn, 2 * stored});
-  if (words_.bytes() < stored) words_.reserve(std::max(wanted, stored));
+  try {
+    if (words_.bytes() < stored) words_.reserve(std::max(wanted, stored));
+  } catch (const Error& error) {
+    throw Error("{}; give less --card-memory than {} MiB, or 0", error.what(), stored >> 20);
+  }
   CURVISPLAT_CHECK(place(parts, words_.bytes() / kWordBytes));
   return count;
 }
@@ -125,14 +130,16 @@ bool CardBricks::place(std::span<const StoredPart> parts, uint64_t capacity) {
   return true;
 }
 
-/// The first place between bricks that is large enough.
+/// The place behind all bricks, or the first between them that is large enough.
 std::optional<uint64_t> CardBricks::freePlace(uint64_t words, uint64_t capacity) const {
   uint64_t begin = 0;
+  if (!by_place_.empty()) begin = by_place_.rbegin()->first + bricks_.at(by_place_.rbegin()->second).words;
+  if (begin + words <= capacity) return begin;
+  begin = 0;
   for (const auto& [at, brick] : by_place_) {
     if (at - begin >= words) return begin;
     begin = at + bricks_.at(brick).words;
   }
-  if (begin + words <= capacity) return begin;
   return std::nullopt;
 }
 

@@ -6,9 +6,8 @@ namespace curvisplat {
 
 void CardBuffer::reserve(uint64_t bytes) {
   if (bytes <= bytes_) return;
-  GLint64 most = 0;
-  gl_.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
-  if (bytes > static_cast<uint64_t>(most))
+  const uint64_t most = largest(gl_);
+  if (bytes > most)
     throw Error("this OpenGL has no buffers of {} MiB (at most {}); give --backend egl-quads, or cpu",
                 bytes >> 20, most >> 20);
   bytes_ = 0;
@@ -16,6 +15,18 @@ void CardBuffer::reserve(uint64_t bytes) {
   gl_.BufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_COPY);
   gl_.check("splats and the lists of tiles");
   bytes_ = bytes;
+}
+
+void CardBuffer::release() {
+  bind();
+  gl_.BufferData(GL_SHADER_STORAGE_BUFFER, 0, nullptr, GL_DYNAMIC_COPY);
+  bytes_ = 0;
+}
+
+uint64_t CardBuffer::largest(const GlFunctions& gl) {
+  GLint64 most = 0;
+  gl.GetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
+  return static_cast<uint64_t>(most);
 }
 
 void CardBuffer::clear() const {

@@ -13,7 +13,12 @@ class CardBuffer {
  public:
   explicit CardBuffer(const GlFunctions& gl) : gl_(gl), object_(makeBuffer(gl)) {}
 
+  /// Throws Error where the card has no such memory, or OpenGL no such buffers.
   void reserve(uint64_t bytes);
+  /// Gives its memory up.
+  void release();
+  /// The largest that there can be.
+  static uint64_t largest(const GlFunctions& gl);
   /// Binds the buffer for shaders, at the binding.
   void bind(GLuint binding) const { gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, object_.name()); }
   /// Binds the buffer for glBufferSubData and the like, at GL_SHADER_STORAGE_BUFFER.

@@ -240,7 +240,11 @@ void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const 
       bricks.project(settings, keys, parts, tables, SplatChooser::largestScalar(*table), splats);
     });
   };
-  splats.reserve((stored + kMaxRecords + capacity.splats) * sizeof(ScreenSplat));
+  try {
+    splats.reserve((stored + kMaxRecords + capacity.splats) * sizeof(ScreenSplat));
+  } catch (const Error& error) {
+    throw Error("{}; give less --card-memory, or 0", error.what());
+  }
   project_stored();
 }
 
@@ -273,6 +277,11 @@ void GlTilePainter::State::paintBatch(bool last) {
     const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
     lookAtClosed();
     upload();
+    if (overfull) {
+      batch.resize(kMaxRecords);
+      waiting = 0;
+      return;
+    }
     const ListedSplats listed = listedSplats(last);
     const CardTiles tiles = tilesOf(listed.ordered);
     if (clip.x0 < clip.x1 && clip.y0 < clip.y1) paintBox(listed, tiles, tilesOver(clip, tiles.side));
@@ -310,6 +319,10 @@ void GlTilePainter::State::upload() {
   const StageTimer timer(upload_s, "upload splats");
   const std::span<const ScreenSplat> all = batch;
   const uint64_t bytes = (stored + std::max(all.size(), capacity.splats + kMaxRecords)) * sizeof(ScreenSplat);
+  if (stored > 0 && bytes > CardBuffer::largest(gl)) {  // smaller regions of the picture need less
+    overfull = true;
+    return;
+  }
   if (bytes > splats.bytes()) {  // more wait than there was space for
     splats.reserve(bytes);
     if (stored > 0) project_stored();

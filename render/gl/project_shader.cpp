@@ -142,7 +142,8 @@ float extinctionTo(float x) {
 }
 // A cell more to both sides, as ClassificationTable::fullyTransparent().
 bool isTransparent(float low, float high) {
-  return extinctionTo(floor(cellOf(high)) + 2.0) - extinctionTo(floor(cellOf(low)) - 1.0) <= 0.0;
+  float from = min(floor(cellOf(low)) - 1.0, float(cells)), to = max(floor(cellOf(high)) + 2.0, 0.0);
+  return extinctionTo(max(to, from + 1.0)) - extinctionTo(from) <= 0.0;
 }
 
 // The first key of any tile that the splat touches; as setFirst() in tile_key.h, which says why.

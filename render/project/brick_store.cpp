@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <numbers>
 
 namespace curvisplat {
 
@@ -11,7 +12,7 @@ bool BrickStore::canDraw(const ProjectionSettings& settings) {
   return !settings.layers && !settings.gradient;
 }
 
-bool BrickStore::canDraw(const Brick& brick, const ProjectionSettings& settings) {
+bool BrickStore::canDraw(const Brick& brick, const glm::dvec3& cell_min, const ProjectionSettings& settings) {
   const glm::dvec3 middle = 0.5 * (brick.lower + brick.upper), extent = 0.5 * (brick.upper - brick.lower);
   const auto is_inside = [&](const ClipPlane& plane) {
     const glm::dvec3 normal = glm::normalize(plane.normal);
@@ -24,7 +25,9 @@ bool BrickStore::canDraw(const Brick& brick, const ProjectionSettings& settings)
   const double radius = brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
   const double half = glm::dot(glm::abs(view.forward * view.scale), extent);
   const double nearest = view.viewFromData(middle).z - half;
-  return nearest > view.near && radius <= 0.99 * view.widest * nearest;  // but for rounding
+  // PerspectiveMap::radiusOf() may be √3 times as large; one in a hundred is for rounding.
+  return nearest > view.near && view.viewFromData(cell_min).z > view.near &&
+         std::numbers::sqrt3 * radius <= 0.99 * view.widest * nearest;
 }
 
 }  // namespace curvisplat

@@ -36,6 +36,7 @@ class BrickStore {
   virtual void open(uint64_t content) = 0;
   /// Makes room in `bytes` of the card's memory for the bricks of parts, and for what they are drawn as. Returns how many of
   /// the first parts fit, which depends on nothing else; bricks that no part needs go, where there is no space beside them.
+  /// Throws Error where the card refuses that memory.
   virtual size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) = 0;
   /// The default of `bytes`: a share of what the card has free; 0 where the processor draws.
   virtual uint64_t defaultBytes() const = 0;
@@ -49,7 +50,8 @@ class BrickStore {
   /// gradient.
   static bool canDraw(const ProjectionSettings& settings);
   /// Whether a brick can, in such a picture: neither clip planes nor perspective cut its splats.
-  static bool canDraw(const Brick& brick, const ProjectionSettings& settings);
+  /// `cell_min`: the corner that its splats' positions count from.
+  static bool canDraw(const Brick& brick, const glm::dvec3& cell_min, const ProjectionSettings& settings);
 
   /// Projects the parts, all of which are stored. Between begin() and the first draw() of the painter.
   virtual void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,

@@ -124,6 +124,7 @@ void TileQueues::clear() {
   // Parts keep some splats twice. The picture that was too large is drawn again without them, as are all that follow.
   if (full_) divides_ = false;
   full_ = false;
+  promised_ = 0;
 }
 
 /// The place where the next `places` of a queue lie in one chunk: at `count`, or where the next chunk begins.
@@ -235,13 +236,13 @@ size_t TileQueues::workOf(size_t number, size_t entries, bool last) const {
 }
 
 bool TileQueues::divide(size_t number) {
-  // Neighbouring parts keep splats that touch both: of a quarter that has kMinPart order tiles along its side, half.
-  constexpr size_t kCopies = 2;
   if (!divides_ || chunks_ * kChunk < kMinToDivide) return false;
   const Queue& divided = queues_[number];
   const Square all = Square::of(divided.order_tiles);
   if (all.side <= kMinPart || queues_.size() + kParts > max_queues_) return false;
-  if (!hasSpaceFor(kCopies * divided.chunks.size() + kParts)) return false;
+  const size_t needed = chunksToMove(divided);
+  if (!hasSpaceFor(promised_ + needed)) return false;
+  promised_ += needed;
   const int side = all.side / 2;
   for (int part = 0; part < static_cast<int>(kParts); ++part) {
     Queue& added = queues_.emplace_back();
@@ -253,8 +254,16 @@ bool TileQueues::divide(size_t number) {
   return true;
 }
 
+/// The most chunks that moving a queue to its parts takes. Neighbouring parts keep splats that touch both: of a quarter that has
+/// kMinPart order tiles along its side, half.
+size_t TileQueues::chunksToMove(const Queue& queue) {
+  constexpr size_t kCopies = 2;
+  return kCopies * queue.chunks.size() + kParts;
+}
+
 void TileQueues::moveToParts(size_t number, size_t first_part) {
   Queue& divided = queues_[number];
+  promised_ -= chunksToMove(divided);
   std::vector<Active>& active = scratch_.local().active;
   list(divided, cornerOf(divided.tile), active);
   for (size_t n = first_part; n < first_part + kParts; ++n) {

@@ -121,6 +121,7 @@ class TileQueues {
   static size_t chunksFor(size_t splats, unsigned threads);
   static size_t maxParts(unsigned threads);
   TileCorner cornerOf(size_t number) const;
+  static size_t chunksToMove(const Queue& queue);
   bool hasSpace() const { return free_count_.load(std::memory_order_relaxed) > chunks_ / 4; }
   /// Whether this many chunks are free, and not much less than hasSpace() asks for in addition.
   bool hasSpaceFor(size_t chunks) const {
@@ -150,6 +151,7 @@ class TileQueues {
   Mutex mutex_;
   std::vector<uint32_t> free_ GUARDED_BY(mutex_);  // chunks
   std::atomic<size_t> free_count_;
+  std::atomic<size_t> promised_ = 0;  // chunks that queues may still need which were divided, but not moved
   const size_t chunks_;
   std::atomic<bool> full_ = false;
   bool divides_ = true;

@@ -118,6 +118,24 @@ TEST_P(AroundBackends, DrawWhatTheProcessorDraws) {
   }
 }
 
+TEST_F(DrawnWake, KeepsBricksOnTheCardAsItIsTold) {
+  madeCache(file("wake"), "wake", "24x16x12", {"--scalar", "f"});
+  const auto storedWith = [&](const Words& more) {
+    pictureOf(file("wake.splats"), file("a.pfm"), Words{"--stats", file("s.json")} + more, "40x30");
+    return jsonOf(file("s.json")).at("frames").at(0).at("card_splats").get<uint64_t>();
+  };
+  EXPECT_EQ(storedWith({"--backend", "cpu", "--card-memory", "64M"}), 0u);
+  const auto report = nlohmann::json::parse(run({"info", "--system", "--json"}).out);
+  for (const auto& backend : report.at("backends"))
+    if (backend.at("name") == "egl" &&
+        backend.at("found").dump().find("compute shaders") != std::string::npos) {
+      EXPECT_GT(storedWith({"--backend", "egl", "--card-memory", "64M"}), 0u);
+      EXPECT_EQ(storedWith({"--backend", "egl", "--card-memory", "0"}), 0u);
+    }
+  expectRefused({"render", file("wake.splats"), "-o", file("b.png"), "--card-memory", "much"}, 2,
+                {"--card-memory much: expected a size such as 512M"});
+}
+
 // Mesa can be told to have an older OpenGL.
 TEST_F(DrawnWake, HasQuadsWhereThereAreNoComputeShaders) {
   const auto eglOf = [] {

@@ -1,5 +1,6 @@
 // Bricks that stay on the card: whatever stays there, a picture is the processor's but for rounding, and its bits depend
 // on nothing but the plan and the card's memory.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -85,9 +86,12 @@ TEST_F(CardBricksTest, AreDrawnAsTheProcessorDrawsThem) {
 TEST_F(CardBricksTest, LeaveToTheProcessorWhatIsCut) {
   const auto half = [this](FrameOptions& o) { o.clip_planes = {{middle(), {1, 0.2, 0}}}; };
   EXPECT_GT(compare("clip plane", camera("iso"), half), 0u);
-  Camera close = camera("iso", Projection::kPerspective);
-  close.position = middle() + 0.02 * (close.position - middle());
-  compare("from the inside", close, [](FrameOptions&) {});
+  // Some bricks are too near for what they hold, others not: perspective cuts their splats.
+  for (const double distance : {0.02, 0.1, 0.3, 0.6}) {
+    Camera close = camera("iso", Projection::kPerspective);
+    close.position = middle() + distance * (close.position - middle());
+    compare(fmt::format("from {} of the distance", distance), close, [](FrameOptions&) {});
+  }
 }
 
 TEST_F(CardBricksTest, GiveTheSameBitsForAnyHistoryThreadsAndMemory) {
@@ -116,6 +120,25 @@ TEST_F(CardBricksTest, AreReadOnce) {
   egl_->render(camera("-x"), options(64 * kMiB), second);
   EXPECT_EQ(second.bytes_read, 0u);
   EXPECT_EQ(second.card_splats, first.card_splats);
+}
+
+TEST_F(CardBricksTest, KeepWhatLiesFarOutsideOfTheFunction) {
+  // In cells of the table both ends of a splat's interval are the same float.
+  const auto narrow = [&](Backend backend) {
+    const TransferFunction function = TransferFunction::preset("viridis", -5, -5 + 1e-4, 0.02);
+    FrameStatistics statistics;
+    return FrameRenderer(*cache_, 0, function, backend).render(camera("iso"), options(64 * kMiB), statistics);
+  };
+  EXPECT_GE(compareImages(narrow(Backend::kEgl), narrow(Backend::kCpu)).psnr_db, 60);
+}
+
+TEST_F(CardBricksTest, GiveMemoryUpWhereThereIsLessOfIt) {
+  FrameStatistics all, few;
+  egl_->render(camera("iso"), options(64 * kMiB), all);
+  egl_->render(camera("iso"), options(2 * kMiB), few);
+  EXPECT_LT(few.card_splats, all.card_splats);
+  egl_->render(camera("iso"), options(64 * kMiB), few);
+  EXPECT_EQ(few.card_splats, all.card_splats);
 }
 
 TEST_F(CardBricksTest, StayAwayWithoutMemory) {

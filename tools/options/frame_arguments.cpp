@@ -94,7 +94,8 @@ FrameOptions frameOptions(const FrameArguments& arguments) {
   options.threads = arguments.threads;
   options.memory_bytes = parseMemory("--memory", arguments.memory);
   if (arguments.card_memory)
-    options.card_memory_bytes = parseByteSize("--card-memory", *arguments.card_memory);
+    options.card_memory_bytes =
+        *arguments.card_memory == "0" ? 0 : parseByteSize("--card-memory", *arguments.card_memory);
   options.keep_going = arguments.keep_going;
   return options;
 }

@@ -58,6 +58,7 @@ FrameArguments frameArguments(const Options& frame, const py::dict& others) {
   arguments.classify = frame.at("classify");
   arguments.scale = frame.at("scale");
   arguments.memory = frame.at("memory");
+  arguments.card_memory = given(frame, "card_memory");
   arguments.lod_pixels = frame.at("lod_pixels");
   arguments.clip_box = given(frame, "clip_box");
   arguments.max_splats = given(frame, "max_splats");

@@ -354,7 +354,8 @@ class Cache:
                lines_by: str = "", lines_colour: Union[str, Sequence[str]] = (), line_width: Union[str, float] = "3px",
                point_size: Union[str, float] = "6px", lines_opacity: float = 1,
                channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
-               max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
+               max_splats: Optional[int] = None, memory: Union[str, int] = "512M",
+               card_memory: Union[str, int, None] = None, threads: int = 0,
                backend: str = "auto", keep_going: bool = False, progress: Optional[Progress] = None) -> Picture:
         """Draws a picture, bit for bit the one of `curvisplat render` with the same options.
 
@@ -401,7 +402,8 @@ class Cache:
         picture, and title and label, texts with the fields {time}, {step}, {frame}, {scalar} and {units}. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
 
         lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws
-        the best that has no more. memory: the limit, in bytes or as "512M"; threads: 0 for all cores; backend: "auto",
+        the best that has no more. memory: the limit, in bytes or as "512M"; card_memory: of a
+        graphics card, for bricks that stay there (default: three quarters of what is free); threads: 0 for all cores; backend: "auto",
         "cpu", "egl", "egl-quads" or "osmesa". keep_going: draw coarser where bricks are damaged. progress: called with (phase, done,
         total, unit).
 
@@ -417,7 +419,7 @@ class Cache:
         of_two = _given(opacity_by=opacity_by or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh,
                         opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf), iso_by=iso_by or None)
         frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
-                       scale=scale, memory=str(memory),
+                       scale=scale, memory=str(memory), card_memory=None if card_memory is None else str(card_memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
                        gradient_opacity=None if gradient_opacity is None else _opacities(gradient_opacity),
                        max_splats=None if max_splats is None else str(max_splats),
