@@ -121,7 +121,8 @@ TEST_P(AroundBackends, DrawWhatTheProcessorDraws) {
 TEST_F(DrawnWake, KeepsBricksOnTheCardAsItIsTold) {
   madeCache(file("wake"), "wake", "24x16x12", {"--scalar", "f"});
   const auto storedWith = [&](const Words& more) {
-    pictureOf(file("wake.splats"), file("a.pfm"), Words{"--stats", file("s.json")} + more, "40x30");
+    pictureOf(file("wake.splats"), file("a.pfm"), Words{"--stats", file("s.json"), "--view", "iso"} + more,
+              "40x30");
     return jsonOf(file("s.json")).at("frames").at(0).at("card_splats").get<uint64_t>();
   };
   EXPECT_EQ(storedWith({"--backend", "cpu", "--card-memory", "64M"}), 0u);

@@ -42,8 +42,8 @@ struct ExportArguments {
   ScalarArguments scalar;
   std::optional<std::string> max_splats, voxels;
   std::optional<double> iso;
-  bool of_source = false;           // the isosurface is that of the grid's own cells
-  std::vector<std::string> source;  // its files; none: those that the cache names
+  bool of_source = false;                     // the isosurface is that of the grid's own cells
+  std::vector<std::filesystem::path> source;  // its files; none: those that the cache names
   PointSource grid;
   std::string memory = "512M";
   StepArguments step;
@@ -162,7 +162,7 @@ void exportIsosurface(ExportArguments& arguments) {
   requireIsovalue(cache, variable, options.value);
   requireThreads();
   if (arguments.of_source) {
-    const std::vector<std::filesystem::path> files(arguments.source.begin(), arguments.source.end());
+    const std::vector<std::filesystem::path>& files = arguments.source;
     setSource(cache, files, arguments.grid.grid);
     std::vector<std::filesystem::path> inputs = arguments.grid.grid.solutions;
     inputs.push_back(arguments.grid.grid.grid);
@@ -292,12 +292,8 @@ void addExport(CLI::App& app) {
   addStepOptions(*command, arguments->step, "Data and colours");
   addMaxSplatsOption(*command, arguments->max_splats)->default_str(kDefaultSplats);
   command->add_option("--iso", arguments->iso, "Isosurface of this value, as triangles: .ply, .stl or .vtp");
-  command
-      ->add_option("--source", arguments->source,
-                   "--iso: contour the grid's own cells, from these files, or without any from those that "
-                   "the cache names. "
-                   "Nothing is missing, however thin cells are; node-centred scalars alone")
-      ->expected(0, -1);
+  addSourceOption(*command, arguments->source,
+                  ". --iso contours these cells, however thin they are; node-centred scalars only");
   addGasOptions(*command, arguments->grid.gas);
   command->add_option("--voxels", arguments->voxels, ".vdb, --iso: voxels along the longest side of the data")
       ->default_str(kDefaultVoxels);

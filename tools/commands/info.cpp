@@ -410,11 +410,7 @@ void addProbeOptions(CLI::App& info, InfoOptions& options) {
                                 ->type_name("FROM TO N")
                                 ->expected(3)
                                 ->excludes(probe);
-  info.add_option("--source", options.probe.source,
-                  "Take the values from the grid's own cells: from these files, or without any from those "
-                  "that the cache names. Exact, where the cache has rounded means")
-      ->group(kProbe)
-      ->expected(0, -1);
+  addSourceOption(info, options.probe.source)->group(kProbe);
   info.add_option("-o,--output", options.probe.plot, "Draw the values along the line into this PNG file")
       ->group(kProbe)
       ->needs(line);

@@ -73,6 +73,16 @@ CLI::Option* addStepsOption(CLI::App& command, std::optional<std::string>& steps
       "--steps", steps, "Time steps to take: all, FIRST:LAST or FIRST:LAST:STRIDE, counted from 0" + note);
 }
 
+CLI::Option* addSourceOption(CLI::App& command, std::vector<std::filesystem::path>& files,
+                             const std::string& note) {
+  return command
+      .add_option("--source", files,
+                  "Take the values from the grid's own cells: from these files, or without any from those "
+                  "that the cache names. Exact, where the cache has rounded means" +
+                      note)
+      ->expected(0, -1);
+}
+
 CLI::Option* addStatsOption(CLI::App& command, std::filesystem::path& file) {
   return command.add_option("--stats", file, "Write times, bytes and counts to this JSON file");
 }

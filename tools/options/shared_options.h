@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace curvisplat {
 
@@ -25,6 +26,9 @@ CLI::Option* addFrameTimeOption(CLI::App& command, std::optional<std::string>& m
                                 const std::string& note);
 CLI::Option* addStepsOption(CLI::App& command, std::optional<std::string>& steps,
                             const std::string& note = {});
+/// --source, with files of the grid or without.
+CLI::Option* addSourceOption(CLI::App& command, std::vector<std::filesystem::path>& files,
+                             const std::string& note = {});
 CLI::Option* addStatsOption(CLI::App& command, std::filesystem::path& file);
 CLI::Option* addTraceOption(CLI::App& command, std::filesystem::path& file);
 
