@@ -83,7 +83,7 @@ size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
   for (; count < parts.size(); ++count) {
     const uint64_t with_stored = stored + kWordBytes * wordsOf(parts[count].splats),
                    with_drawn = drawn + sizeof(ScreenSplat) * drawnSplats(parts[count]);
-    // Of the buffer of splats the painter needs a part for those that are drawn beside the stored ones.
+    // The painter needs a part of the buffer of splats for those that are drawn beside the stored ones.
     if (with_stored > largest || 2 * with_drawn > largest || with_stored + with_drawn > bytes) break;
     stored = with_stored;
     drawn = with_drawn;

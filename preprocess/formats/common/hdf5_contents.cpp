@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <span>
+#include <string_view>
 #include <utility>
 
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {
@@ -23,6 +26,22 @@ constexpr uint64_t kMaxPacking = 65536, kSmall = uint64_t{1} << 20;
 using Hdf5Object = Hdf5Handle<H5Oclose>;
 
 }  // namespace
+
+std::set<std::string> rootLinksOf(const InputFile& file, std::initializer_list<const char*> names) {
+  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+  std::string begin(kSignature.size(), '\0');
+  if (file.size() < begin.size()) return {};
+  file.readAt(0, std::span(begin.data(), begin.size()));
+  if (begin != kSignature) return {};
+  requireWholeHdf5(file);
+  tryHdf5(file.path());
+  const QuietHdf5 quiet;
+  const Hdf5File open(H5Fopen(file.path().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  std::set<std::string> links;
+  for (const char* const name : names)
+    if (open && H5Lexists(open.id(), name, H5P_DEFAULT) > 0) links.insert(name);
+  return links;
+}
 
 Hdf5Contents::Hdf5Contents(std::filesystem::path path) : path_(std::move(path)) {
   tryHdf5(path_);

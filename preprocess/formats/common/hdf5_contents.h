@@ -3,15 +3,23 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "preprocess/formats/common/hdf5_arrays.h"
 
 namespace curvisplat {
+
+class InputFile;
+
+/// Returns which of the names are links of the file's root group; none where it is no HDF5 file. HDF5 tries it first in a
+/// process of its own (library_trial.h). Throws Error for a file that is not whole, or that ends the library.
+std::set<std::string> rootLinksOf(const InputFile& file, std::initializer_list<const char*> names);
 
 class Hdf5Contents {
  public:
@@ -45,7 +53,7 @@ class Hdf5Contents {
   std::shared_ptr<const Hdf5Array> required(const std::string& place) const;
   /// Some numbers of a list of integers. Throws Error if it does not have them.
   std::vector<int64_t> integers(const std::string& place, uint64_t first, uint64_t count) const;
-  /// The same where they count something.
+  /// Returns integers() that count something. Throws Error for one below zero, too.
   std::vector<uint64_t> counts(const std::string& place, uint64_t first, uint64_t count) const;
 
  private:

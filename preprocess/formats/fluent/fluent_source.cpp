@@ -419,16 +419,8 @@ void FluentSource::readValues(uint32_t, uint32_t scalar, uint64_t first, std::sp
 }  // namespace
 
 bool isFluentHdf5(const InputFile& file) {
-  std::string begin(8, '\0');
-  if (file.size() < begin.size()) return false;
-  file.readAt(0, std::span(begin.data(), begin.size()));
-  if (begin != "\x89HDF\r\n\x1a\n") return false;
-  requireWholeHdf5(file);
-  tryHdf5(file.path());
-  const QuietHdf5 quiet;
-  const Hdf5File open(H5Fopen(file.path().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-  const auto has = [&](const char* link) { return open && H5Lexists(open.id(), link, H5P_DEFAULT) > 0; };
-  return has("settings") && (has("meshes") || has("results"));
+  const std::set<std::string> links = rootLinksOf(file, {"settings", "meshes", "results"});
+  return links.contains("settings") && links.size() > 1;
 }
 
 std::unique_ptr<DataSource> openFluent(const OpenGridOptions& options) {

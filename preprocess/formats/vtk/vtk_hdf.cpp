@@ -8,8 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "preprocess/formats/common/hdf5_objects.h"
-#include "preprocess/formats/common/library_trial.h"
+#include "preprocess/formats/common/hdf5_contents.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/vtk/vtk_hdf_file.h"
 #include "preprocess/formats/vtk/vtk_mesh_source.h"
@@ -437,15 +436,7 @@ class HdfGatherer {
 }  // namespace
 
 bool isVtkHdf(const InputFile& file) {
-  std::string begin(8, '\0');
-  if (file.size() < begin.size()) return false;
-  file.readAt(0, std::span(begin.data(), begin.size()));
-  if (begin != "\x89HDF\r\n\x1a\n") return false;
-  requireWholeHdf5(file);
-  tryHdf5(file.path());
-  const QuietHdf5 quiet;
-  const Hdf5File open(H5Fopen(file.path().c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-  return open && H5Lexists(open.id(), kRoot, H5P_DEFAULT) > 0;
+  return !rootLinksOf(file, {kRoot}).empty();
 }
 
 std::unique_ptr<DataSource> openVtkHdf(const OpenGridOptions& options) {
