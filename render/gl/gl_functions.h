@@ -96,12 +96,14 @@ namespace curvisplat {
   X(GetBufferSubData, PFNGLGETBUFFERSUBDATAPROC) \
   X(GetInteger64v, PFNGLGETINTEGER64VPROC)       \
   X(GetTexImage, PFNGLGETTEXIMAGEPROC)           \
+  X(MapBufferRange, PFNGLMAPBUFFERRANGEPROC)     \
   X(MemoryBarrier, PFNGLMEMORYBARRIERPROC)       \
   X(TexStorage3D, PFNGLTEXSTORAGE3DPROC)         \
   X(Uniform1ui, PFNGLUNIFORM1UIPROC)             \
   X(Uniform2i, PFNGLUNIFORM2IPROC)               \
   X(Uniform3i, PFNGLUNIFORM3IPROC)               \
-  X(Uniform4i, PFNGLUNIFORM4IPROC)
+  X(Uniform4i, PFNGLUNIFORM4IPROC)               \
+  X(UnmapBuffer, PFNGLUNMAPBUFFERPROC)
 
 struct GlFunctions {
 #define CURVISPLAT_GL_MEMBER(name, type) type name = nullptr;

@@ -5,8 +5,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kEntryBytes = 2 * sizeof(uint32_t);
-
 uint32_t groupsOf(uint64_t count, uint32_t a_group) {
   return static_cast<uint32_t>((count + a_group - 1) / a_group);
 }

@@ -36,6 +36,7 @@ struct CardTiles {
 
 class GlTileLists {
  public:
+  static constexpr uint64_t kEntryBytes = 2 * sizeof(uint32_t);
   /// Kinds of its timers.
   enum Stage : size_t { kList, kSort, kOtherStages };
 

@@ -42,6 +42,11 @@ uint64_t defaultBytesOf(const GlFunctions& gl) {
   return uint64_t{768} << 20;
 }
 
+/// The lists of tiles take no more than a sixth of what bricks take by default.
+GlTilePainter::Capacity within(uint64_t default_bytes, const GlTilePainter::Capacity& most) {
+  return {most.splats, std::clamp<size_t>(default_bytes / 6 / GlTileLists::kEntryBytes, 1, most.entries)};
+}
+
 /// An element that fills the gap before a batch's first: it is no splat, and no shader draws it.
 const ScreenSplat kNoSplat = ScreenDepth{}.record();
 
@@ -65,19 +70,20 @@ TileBox tilesOver(const TileBox& pixels, int side) {
 struct GlTilePainter::State final : BrickStore {
   State(const GlFunctions& functions, const Capacity& capacity_, bool software)
       : gl(functions),
-        capacity(capacity_),
         default_bytes(software ? 0 : defaultBytesOf(functions)),
+        capacity(software ? capacity_ : within(default_bytes, capacity_)),
         tables(gl),
         lists(gl, timers),
         splats(gl),
         closed(gl),
         bricks(gl),
         windows(makeTexture(gl)),
-        framebuffer(makeFramebuffer(gl)) {}
+        framebuffer(makeFramebuffer(gl)),
+        drawn(makeBuffer(gl)) {}
 
   const GlFunctions& gl;
-  const Capacity capacity;
   const uint64_t default_bytes;
+  const Capacity capacity;
   std::map<SplatShaderKind, GlProgram> programs;  // each compiled when it is first needed
   SplatTables tables;
   GlTimers timers{gl, kStages};
@@ -86,10 +92,9 @@ struct GlTilePainter::State final : BrickStore {
   CardBricks bricks;
   size_t stored = 0;  // splats that were projected from bricks, in `splats`; the batch follows
   std::function<void()> project_stored;
-  GlObject windows, framebuffer;
+  GlObject windows, framebuffer, drawn;  // drawn: the windows, where the processor can read them
   ImageSize size{0, 0};
   int window_count = 0;
-  std::unique_ptr<float[]> drawn;  // the windows, as they are read at the end
   unsigned threads = 0;
   glm::vec4 background{0};
   const ClassificationTable* table = nullptr;
@@ -133,6 +138,7 @@ struct GlTilePainter::State final : BrickStore {
   void paintLists(const CardTiles& tiles, const TileBox& box);
   void keepWaiting(uint32_t front);
   void lookAtClosed();
+  std::span<const float> readWindows();
 };
 
 GlTilePainter::GlTilePainter(const GlContext& context)
@@ -172,8 +178,11 @@ void GlTilePainter::State::allocate(ImageSize wanted, int count) {
   closed.reserve((TileSet::tilesOf(wanted, kSmallTile) + TileSet::tilesOf(wanted, kLargeTile)) *
                  sizeof(uint32_t));
   gl.check("the picture");
-  drawn = std::make_unique_for_overwrite<float[]>(4 * wanted.pixels() * static_cast<size_t>(count));
   window_bytes = 4 * sizeof(float) * wanted.pixels() * static_cast<uint64_t>(count);
+  gl.BindBuffer(GL_PIXEL_PACK_BUFFER, drawn.name());
+  gl.BufferData(GL_PIXEL_PACK_BUFFER, static_cast<GLsizeiptr>(window_bytes), nullptr, GL_STREAM_READ);
+  gl.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+  gl.check("the picture that is read");
   hidden = std::make_unique<std::atomic<uint8_t>[]>(TileSet::tilesOf(wanted, kLargeTile));
   size = wanted;
   window_count = count;
@@ -428,16 +437,33 @@ bool GlTilePainter::hides(const ScreenBox& box) const {
   return true;
 }
 
+/// What was drawn, until the buffer is unmapped. It goes through a buffer that the card itself writes, since drivers copy into
+/// other memory much slower.
+std::span<const float> GlTilePainter::State::readWindows() {
+  gl.BindTexture(GL_TEXTURE_2D_ARRAY, windows.name());
+  gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, nullptr);
+  const void* const mapped =
+      gl.MapBufferRange(GL_PIXEL_PACK_BUFFER, 0, static_cast<GLsizeiptr>(window_bytes), GL_MAP_READ_BIT);
+  gl.check("reading the picture");
+  return {static_cast<const float*>(mapped), window_bytes / sizeof(float)};
+}
+
 Image GlTilePainter::end() {
   State& state = *state_;
   state.paintBatch(true);
   const StageTimer timer(state.draw_s, "draw (OpenGL)");
-  const size_t floats = 4 * state.size.pixels() * static_cast<size_t>(state.window_count);
-  state.gl.BindTexture(GL_TEXTURE_2D_ARRAY, state.windows.name());
-  state.gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, state.drawn.get());
-  state.gl.check("reading the picture");
+  const GlFunctions& gl = state.gl;
+  gl.BindBuffer(GL_PIXEL_PACK_BUFFER, state.drawn.name());
+  const struct Unmap {  // where there is no memory for the picture, too
+    const GlFunctions& gl;
+    ~Unmap() {
+      gl.UnmapBuffer(GL_PIXEL_PACK_BUFFER);
+      gl.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    }
+  } unmap{gl};
+  const std::span<const float> drawn = state.readWindows();
   state.timers.finish();
-  return state.tables.composite({state.drawn.get(), floats}, false, state.background, state.threads);
+  return state.tables.composite(drawn, false, state.background, state.threads);
 }
 
 bool GlTilePainter::isOverfull() const {

@@ -21,13 +21,14 @@ namespace curvisplat {
 
 class GlTilePainter final : public Painter {
  public:
-  /// The capacity of the painter: `splats` of a batch, in memory and on the card, and `entries` of tiles'
-  /// lists, 8 bytes each, there.
+  /// The capacity of the painter: `splats` of a batch, in memory and on the card, and `entries` of tiles' lists, 8 bytes each,
+  /// there: at most those, of a card with little memory fewer. A picture whose entries do not fit is painted in boxes one after
+  /// the other, and a box that leaves most of a card idle takes as long as the whole picture would.
   struct Capacity {
     size_t splats, entries;
     /// The capacity for a card, or for OpenGL in software, which the processor's memory holds.
     static Capacity of(bool software) {
-      return software ? Capacity{65536, 1 << 19} : Capacity{1 << 18, 1 << 22};
+      return software ? Capacity{65536, 1 << 19} : Capacity{1 << 18, 1 << 27};
     }
   };
 

@@ -8,10 +8,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr const char* kScan = R"(
-layout(std430, binding = 0) buffer Sums { uint sums[]; };  // [row][length]
-layout(std430, binding = 1) buffer Totals { uint totals[]; };  // [row]
-uniform uint length_of_row;
+constexpr const char* kSums = R"(
 shared uint lane_sums[THREADS];
 
 // The sum, or the largest number if that is less: of more entries than can be counted, none is written.
@@ -39,6 +36,12 @@ uint sumBefore(uint value) {
   }
   return lane_sums[thread] - value;
 }
+)";
+
+constexpr const char* kScan = R"(
+layout(std430, binding = 0) buffer Sums { uint sums[]; };  // [row][length]
+layout(std430, binding = 1) buffer Totals { uint totals[]; };  // [row]
+uniform uint length_of_row;
 
 void main() {
   uint carry = 0u, begin = gl_WorkGroupID.x * length_of_row;
@@ -95,40 +98,67 @@ bool isClosed(ivec2 tile) {
   return closed[closed_begin + tile.y * closed_columns + tile.x] == uint(pixels.x * pixels.y);
 }
 
-void main() {
-  uint n = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * MOST_GROUPS * THREADS;
-  if (n >= splat_count) return;
+struct Listed {
+  vec2 at;      // pixels
+  vec2 middle;  // the same, from the first pixel's middle
+  float lean, span, reach2, tip, reach_y;
+};
+
+// Of pixels at dy the ellipse covers lean dy +- span sqrt(reach2 - dy dy); it goes farthest right at dy = tip.
+Listed listedOf(uint n) {
   vec4 part0 = uintBitsToFloat(splats[4u * n]);
-  if (part0.z < 0.0) return;  // a record
   float l11 = part0.z, l21 = part0.w, l22 = uintBitsToFloat(splats[4u * n + 1u].x);
+  float s11 = l21 * l21 + l22 * l22, reach2 = SUPPORT * SUPPORT * s11;
+  return Listed(part0.xy, part0.xy - 0.5, l11 * l21 / s11, l11 * l22 / s11, reach2, SUPPORT * l21, SUPPORT * sqrt(s11));
+}
+
+ivec2 rowsOf(Listed splat) {
+  return ivec2(firstTile(splat.middle.y - splat.reach_y, box.y, box.w), lastTile(splat.middle.y + splat.reach_y, box.y, box.w) + 1);
+}
+
+void listRow(uint n, Listed splat, int row) {
+  float top = float(row * side) - splat.middle.y, bottom = top + float(side - 1);
+  float right = clamp(splat.tip, top, bottom), left = clamp(-splat.tip, top, bottom);
+  float to_x = splat.middle.x + splat.lean * right + splat.span * sqrt(max(splat.reach2 - right * right, 0.0));
+  float from_x = splat.middle.x + splat.lean * left - splat.span * sqrt(max(splat.reach2 - left * left, 0.0));
   uvec4 part3 = splats[4u * n + 3u];  // key, first, key_slope0, key_slope1
   vec2 key_slope = uintBitsToFloat(part3.zw);
-  vec2 middle = part0.xy - 0.5;  // from the first pixel's
-  float s11 = l21 * l21 + l22 * l22;
-  float reach_y = SUPPORT * sqrt(s11);
-  // Of pixels at dy the ellipse covers lean dy +- span sqrt(reach2 - dy dy); it goes farthest right at dy = tip.
-  float lean = l11 * l21 / s11, span = l11 * l22 / s11, reach2 = SUPPORT * SUPPORT * s11, tip = SUPPORT * l21;
-  int last_row = lastTile(middle.y + reach_y, box.y, box.w);
-  for (int row = firstTile(middle.y - reach_y, box.y, box.w); row <= last_row; ++row) {
-    float top = float(row * side) - middle.y, bottom = top + float(side - 1);
-    float right = clamp(tip, top, bottom), left = clamp(-tip, top, bottom);
-    float to_x = middle.x + lean * right + span * sqrt(max(reach2 - right * right, 0.0));
-    float from_x = middle.x + lean * left - span * sqrt(max(reach2 - left * left, 0.0));
-    int last = lastTile(to_x, box.x, box.z);
-    for (int column = firstTile(from_x, box.x, box.z); column <= last; ++column) {
-      if (isClosed(ivec2(column, row))) continue;
-      uint key = 0u;
-      if (ordered) {  // keyAt() in tile_key.h
-        vec2 from = vec2(ivec2(column, row) * side) + 0.5 * float(side) - part0.xy;
-        precise float moved = key_slope.x * from.x + key_slope.y * from.y;
-        int held = int(clamp(moved, -MAX_STEPS, MAX_STEPS));
-        key = uint(max(int(part3.x) + held, int(part3.y)));
-        if (key > front || n < waiting && key <= before) continue;
-      }
-      uint tile = uint((row - box.y) * (box.z - box.x) + column - box.x);
-      uint place = atomicAdd(ends[tile], 1u);
-      if (writes) entries[chunks[tile / CHUNK] + place] = uvec2(key, n);
+  int last = lastTile(to_x, box.x, box.z);
+  for (int column = firstTile(from_x, box.x, box.z); column <= last; ++column) {
+    if (isClosed(ivec2(column, row))) continue;
+    uint key = 0u;
+    if (ordered) {  // keyAt() in tile_key.h
+      vec2 from = vec2(ivec2(column, row) * side) + 0.5 * float(side) - splat.at;
+      precise float moved = key_slope.x * from.x + key_slope.y * from.y;
+      int held = int(clamp(moved, -MAX_STEPS, MAX_STEPS));
+      key = uint(max(int(part3.x) + held, int(part3.y)));
+      if (key > front || n < waiting && key <= before) continue;
     }
+    uint tile = uint((row - box.y) * (box.z - box.x) + column - box.x);
+    uint place = atomicAdd(ends[tile], 1u);
+    if (writes) entries[chunks[tile / CHUNK] + place] = uvec2(key, n);
+  }
+}
+
+// Each thread looks at a splat; then all share the rows of tiles of the group's splats evenly, for one may have hundreds of times
+// as many as another.
+void main() {
+  uint begin = (gl_WorkGroupID.x + gl_WorkGroupID.y * MOST_GROUPS) * THREADS, own = begin + gl_LocalInvocationID.x;
+  uint rows = 0u;
+  if (own < splat_count && uintBitsToFloat(splats[4u * own].z) >= 0.0) {  // else a record
+    ivec2 of_own = rowsOf(listedOf(own));
+    rows = uint(max(of_own.y - of_own.x, 0));
+  }
+  sumBefore(rows);
+  uint all = lane_sums[THREADS - 1u];
+  for (uint row = gl_LocalInvocationID.x; row < all; row += THREADS) {
+    uint lane = 0u;  // the first whose rows end behind this one
+    for (uint step = THREADS / 2u; step > 0u; step /= 2u)
+      if (lane_sums[lane + step - 1u] <= row) lane += step;
+    uint n = begin + lane;
+    Listed splat = listedOf(n);
+    uint earlier = lane > 0u ? lane_sums[lane - 1u] : 0u;
+    listRow(n, splat, rowsOf(splat).x + int(row - earlier));
   }
 }
 )";
@@ -202,9 +232,9 @@ std::string tileListShader(TileListStep step) {
       "#version 430 core\n#define THREADS {0}u\n#define MOST_GROUPS {1}u\n#define SORTED_AT_ONCE "
       "{2}u\n#define CHUNK {3}u\n"
       "#define PLACES {4}\n#define SUPPORT {5:.9g}\n#define MAX_STEPS {6:.1f}\nlayout(local_size_x = {0}) "
-      "in;\n{7}{8}",
+      "in;\n{7}{8}{9}",
       sorts ? kSortThreads : kListThreads, kMaxGroups, kSortedAtOnce, kTilesAChunk, sorts ? "readonly" : "",
-      static_cast<float>(kKernelSupport), kMaxSteps, step == TileListStep::kScan ? "" : kPlaces, body);
+      static_cast<float>(kKernelSupport), kMaxSteps, step == TileListStep::kScan ? "" : kPlaces, sorts ? "" : kSums, body);
 }
 
 }  // namespace curvisplat

@@ -9,7 +9,7 @@ namespace curvisplat {
 
 /// The steps, each a program.
 enum class TileListStep {
-  kList,  // a splat a thread, kListThreads a group: counts its entries in tiles, or writes them
+  kList,  // kListThreads splats a group, of as many threads: counts their entries in tiles, or writes them
   kScan,  // a row of sums a group, of kListThreads threads: each becomes the sum of those before it
   kSort   // a tile a group, of kSortThreads threads: its entries, by key and number
 };
@@ -19,7 +19,7 @@ inline constexpr uint32_t kMaxGroups = 32768;  // along x; every OpenGL has 6553
 /// Tiles whose entries are added up by one group.
 inline constexpr uint32_t kTilesAChunk = 8 * kListThreads;
 /// Entries that are sorted in shared memory; more in the card's, which takes longer.
-inline constexpr uint32_t kSortedAtOnce = 1024;
+inline constexpr uint32_t kSortedAtOnce = 2048;
 
 std::string tileListShader(TileListStep step);
 /// Declares `uvec2 rangeOf(uint tile)` for other shaders: where a tile's entries begin and end, by the buffers 1 and 2.
