@@ -301,7 +301,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
   if (plan.shared) beginExchange(plan, options);
   fillStore(plan, options, statistics);
   const FrameWork work{cache_,  plan.parts, plan.settings,      planner_.table(), plan.keys,
-                       hidden_, left_,      options.keep_going, exchange_.get()};
+                       hidden_, is_stored_, options.keep_going, exchange_.get()};
   // With keep_going, what replaces a damaged brick may reach into any region.
   std::vector<FrameRegion> regions =
       options.keep_going && least == 1

@@ -47,7 +47,6 @@
 namespace curvisplat {
 
 struct SamplingWork;
-enum class LeftToWorkers : uint8_t;
 
 /// Draws what lies in the volume before the volume is drawn: surfaces, faces of the grid, slices and
 /// isosurfaces. They become layers of the plan's pixels. DESIGN.md, "Surfaces and slices" and "Isosurfaces".
@@ -149,8 +148,8 @@ class FramePipeline {
   void stopStages();
   FrameBudget budgetOf(const FrameOptions& options) const;
   void fillStore(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
-  void putIntoStore(std::span<const StoredPart> parts, const FrameOptions& options,
-                    FrameStatistics& statistics);
+  void putIntoStore(std::span<const StoredPart> parts, const BorderStyle& borders,
+                    const FrameOptions& options, FrameStatistics& statistics);
   bool isLeftOut(uint32_t brick, const FramePlan& plan, const FrameOptions& options) const;
   void makePools(const FrameOptions& options);
   void dropPools();
@@ -169,8 +168,8 @@ class FramePipeline {
   LayerDrawer layers_;
   uint64_t content_;                         // BrickStore::open()
   std::vector<StoredPart> stored_;           // the parts of the plan that are drawn from the store
-  std::vector<LeftToWorkers> left_;          // [part of the plan]; empty: all to the workers
-  std::vector<uint32_t> unread_;             // bricks of which nothing is left, sorted
+  std::vector<uint8_t> is_stored_;           // [part of the plan]; empty: none is
+  std::vector<uint32_t> unread_;             // stored bricks, sorted
   std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn

@@ -256,9 +256,9 @@ std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t 
 bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
   const uint32_t number = sweep_.parts()[sequence];
   const SweptPart& part = work_->parts[number];
-  const LeftToWorkers left = work_->left.empty() ? LeftToWorkers::kAll : work_->left[number];
-  if (left == LeftToWorkers::kNothing) markSeen(number, Seen::kProjected);
-  if (left == LeftToWorkers::kNothing || sweep_.isBehind(part)) {
+  const bool is_stored = !work_->stored.empty() && work_->stored[number] != 0;
+  if (is_stored) markSeen(number, Seen::kProjected);
+  if (is_stored || sweep_.isBehind(part)) {
     source_.pass(sequence);
     return passOver(sequence);
   }
@@ -280,18 +280,16 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
       markSeen(number, Seen::kHidden);
       return passOver(sequence);
     }
-    project(worker, *fetched, part.keys, left);
+    project(worker, *fetched, part.keys);
   }
   count(worker, seen_[number] == Seen::kProjected);
   markSeen(number, Seen::kProjected);
   return enter(worker, sequence, part.rank, {worker.projector.splats(), worker.keys});
 }
 
-void FrameWorkers::project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys,
-                           LeftToWorkers left) {
+void FrameWorkers::project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys) {
   const StageTimer timer(worker.statistics.project_s, "project brick");
   const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched.cell);
-  worker.projector.setOnlyPieces(left == LeftToWorkers::kPieces);
   worker.projector.project(work_->settings, work_->table, cell_min, fetched.geometry,
                            {fetched.values, fetched.second}, fetched.ranges);
   if (tiles_) worker.projector.keepTouching(*tiles_);

@@ -29,9 +29,6 @@
 
 namespace curvisplat {
 
-/// How much of a part is left to the workers: all of it, or what a BrickStore does not draw of it.
-enum class LeftToWorkers : uint8_t { kAll, kPieces, kNothing };
-
 /// The constant inputs that all workers of a frame share. Must outlive the frame.
 struct FrameWork {
   const CacheReader& cache;
@@ -40,7 +37,7 @@ struct FrameWork {
   const ClassificationTable& table;
   const DepthKeys& keys;
   const HiddenBricks& hidden;
-  std::span<const LeftToWorkers> left = {};  // [part]; empty: all
+  std::span<const uint8_t> stored = {};  // [part] 1 if a BrickStore draws it; empty: none
   bool keep_going = false;
   SplatExchange* exchange = nullptr;  // among the ranks that draw the picture together; null: there is one
 };
@@ -113,8 +110,7 @@ class FrameWorkers {
     std::span<const uint32_t> keys;
   };
   bool enter(Worker& worker, uint64_t sequence, uint32_t rank, const Projected& projected);
-  void project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys,
-               LeftToWorkers left = LeftToWorkers::kAll);
+  void project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys);
   bool hand(Worker& worker, const SweepBuffer::Batch& batch);
   std::optional<BrickSource::Splats> fetch(Worker& worker, uint64_t sequence, const BrickPart& part,
                                            bool keep_going);

@@ -14,7 +14,7 @@ namespace curvisplat {
 void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options,
                               FrameStatistics& statistics) {
   stored_.clear();
-  left_.clear();
+  is_stored_.clear();
   unread_.clear();
   if (painting_ != backend_.get() || options.ranks || options.keep_going || coloured_by_ ||
       !BrickStore::canDraw(plan.settings))
@@ -29,39 +29,42 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
     stored_.push_back(
         {part.part.brick, brick.splats, SplatRanges(brick, part.part.octants), cell_min, part.keys});
   }
-  std::vector<StoredPart> missing;
-  painting_->run([&](Painter& painter) {
-    BrickStore* const store = painter.store();
-    const uint64_t bytes = store ? options.card_memory_bytes.value_or(store->defaultBytes()) : 0;
-    if (store) store->open(content_);
-    const size_t fitting = store ? store->makeRoom(stored_, bytes) : 0;
-    stored_.erase(stored_.begin() + static_cast<std::ptrdiff_t>(fitting), stored_.end());
-    for (const StoredPart& part : stored_)
-      if (!store->has(part.brick)) missing.push_back(part);
-  });
+  // Bricks that are put tell how much room they need, so that fewer of the parts may fit than it seemed.
+  for (;;) {
+    std::vector<StoredPart> missing;
+    painting_->run([&](Painter& painter) {
+      BrickStore* const store = painter.store();
+      const uint64_t bytes = store ? options.card_memory_bytes.value_or(store->defaultBytes()) : 0;
+      if (store) store->open(content_);
+      const size_t fitting = store ? store->makeRoom(stored_, bytes) : 0;
+      stored_.erase(stored_.begin() + static_cast<std::ptrdiff_t>(fitting), stored_.end());
+      for (const StoredPart& part : stored_)
+        if (!store->has(part.brick)) missing.push_back(part);
+    });
+    if (missing.empty()) break;
+    putIntoStore(missing, plan.settings.borders, options, statistics);
+  }
   if (stored_.empty()) return;
-  if (!missing.empty()) putIntoStore(missing, options, statistics);
-  left_.assign(plan.parts.size(), LeftToWorkers::kAll);
-  painting_->run([&](Painter& painter) {
-    for (size_t n = 0; n < stored_.size(); ++n) {
-      const bool pieces = painter.store()->hasPieces(stored_[n].brick);
-      left_[numbers[n]] = pieces ? LeftToWorkers::kPieces : LeftToWorkers::kNothing;
-      if (!pieces) unread_.push_back(stored_[n].brick);
-    }
-  });
+  is_stored_.assign(plan.parts.size(), 0);
+  for (size_t n = 0; n < stored_.size(); ++n) {
+    is_stored_[numbers[n]] = 1;
+    unread_.push_back(stored_[n].brick);
+  }
   std::sort(unread_.begin(), unread_.end());
 }
 
 /// Has the workers fetch and decode the bricks of the parts, which go to the painter's thread one after the other.
-void FramePipeline::putIntoStore(std::span<const StoredPart> parts, const FrameOptions& options,
-                                 FrameStatistics& statistics) {
+void FramePipeline::putIntoStore(std::span<const StoredPart> parts, const BorderStyle& borders,
+                                 const FrameOptions& options, FrameStatistics& statistics) {
   std::vector<BrickPart> bricks;
   for (const StoredPart& part : parts) bricks.push_back({part.brick});
   Mutex putting;
   const auto put = [&](size_t part, const glm::dvec3&, const BrickSource::Splats& splats) {
+    const BrickPieces pieces = BrickPieces::of(splats.geometry, splats.values, borders);
     const MutexLock lock(putting);
-    painting_->run(
-        [&](Painter& painter) { painter.store()->put(parts[part].brick, splats.geometry, splats.values); });
+    painting_->run([&](Painter& painter) {
+      painter.store()->put(parts[part].brick, splats.geometry, splats.values, pieces);
+    });
   };
   sample({cache_, bricks, put}, options, statistics);
 }

@@ -4,7 +4,6 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
-#include "render/gl/project_shader.h"
 #include "render/gl/tile_list_shaders.h"
 #include "render/project/splat_pieces.h"
 #include "stream/base/error.h"
@@ -16,11 +15,7 @@ namespace {
 
 constexpr uint64_t kWordBytes = sizeof(uint32_t);
 
-uint64_t wordsOf(size_t splats) {
-  return kStoredArrays * splats;
-}
-
-size_t drawnSplats(const StoredPart& part) {
+size_t splatsOf(const StoredPart& part) {
   size_t sum = 0;
   for (const SplatRange& range : part.ranges) sum += range.size();
   return sum;
@@ -66,13 +61,25 @@ CardBricks::CardBricks(const GlFunctions& gl)
 void CardBricks::open(uint64_t content) {
   if (content == content_) return;
   content_ = content;
+  known_.clear();
   bricks_.clear();
   by_place_.clear();
 }
 
 bool CardBricks::has(uint32_t brick) const {
-  const auto found = bricks_.find(brick);
-  return found != bricks_.end() && found->second.filled;
+  return bricks_.contains(brick);
+}
+
+/// As far as is known.
+uint64_t CardBricks::wordsOf(const StoredPart& part) const {
+  const auto found = known_.find(part.brick);
+  return kStoredArrays * part.splats + (found == known_.end() ? 0 : found->second.words());
+}
+
+/// elementsOf() without looking for the pieces of its ranges: those of the whole brick, as far as is known.
+uint64_t CardBricks::mostElements(const StoredPart& part) const {
+  const auto found = known_.find(part.brick);
+  return splatsOf(part) + (found == known_.end() ? 0 : kElementsAPiece * found->second.first.back());
 }
 
 size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
@@ -81,57 +88,48 @@ size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
   uint64_t stored = 0, drawn = 0;
   size_t count = 0;
   for (; count < parts.size(); ++count) {
-    const uint64_t with_stored = stored + kWordBytes * wordsOf(parts[count].splats),
-                   with_drawn = drawn + sizeof(ScreenSplat) * drawnSplats(parts[count]);
+    const uint64_t with_stored = stored + kWordBytes * wordsOf(parts[count]),
+                   with_drawn = drawn + sizeof(ScreenSplat) * mostElements(parts[count]);
     // The painter needs a part of the buffer of splats for those that are drawn beside the stored ones.
     if (with_stored > largest || 2 * with_drawn > largest || with_stored + with_drawn > bytes) break;
     stored = with_stored;
     drawn = with_drawn;
   }
-  parts = parts.first(count);
-  const bool is_within = words_.bytes() + drawn <= bytes;
-  if (is_within && place(parts, words_.bytes() / kWordBytes)) return count;
+  for (const StoredPart& part : parts.first(count))
+    if (const auto found = bricks_.find(part.brick); found != bricks_.end()) found->second.used = frame_;
+  const bool is_within = words_.bytes() + drawn <= bytes && stored <= words_.bytes();
+  if (is_within && !is_scattered_) return count;
+  is_scattered_ = false;
   bricks_.clear();
   by_place_.clear();
   if (!is_within) words_.release();
   if (count == 0) return 0;
+  // Twice as much as is known of now, for the pieces, and for other bricks.
   const uint64_t wanted = std::min({largest, bytes - drawn, 2 * stored});
   try {
     if (words_.bytes() < stored) words_.reserve(std::max(wanted, stored));
   } catch (const Error& error) {
     throw Error("{}; give less --card-memory than {} MiB, or 0", error.what(), stored >> 20);
   }
-  CURVISPLAT_CHECK(place(parts, words_.bytes() / kWordBytes));
   return count;
 }
 
-/// Gives each part's brick a place, in which bricks may lie that are not needed. False if there is none.
-bool CardBricks::place(std::span<const StoredPart> parts, uint64_t capacity) {
-  for (const StoredPart& part : parts)
-    if (const auto found = bricks_.find(part.brick); found != bricks_.end()) found->second.used = frame_;
-  const auto removeOldest = [&] {
+/// A free place, for which bricks may go that are not needed, those first that were used least recently.
+std::optional<uint64_t> CardBricks::placeFor(uint64_t words) {
+  for (;;) {
+    if (const auto begin = freePlace(words)) return begin;
     const auto oldest = std::min_element(bricks_.begin(), bricks_.end(), [](const auto& a, const auto& b) {
       return a.second.used < b.second.used;
     });
-    if (oldest == bricks_.end() || oldest->second.used == frame_) return false;
+    if (oldest == bricks_.end() || oldest->second.used == frame_) return {};
     by_place_.erase(oldest->second.begin);
     bricks_.erase(oldest);
-    return true;
-  };
-  for (const StoredPart& part : parts) {
-    if (bricks_.contains(part.brick)) continue;
-    const uint64_t words = wordsOf(part.splats);
-    std::optional<uint64_t> begin;
-    while (!(begin = freePlace(words, capacity)))
-      if (!removeOldest()) return false;
-    bricks_[part.brick] = {*begin, words, frame_, false, false};
-    by_place_[*begin] = part.brick;
   }
-  return true;
 }
 
 /// The place behind all bricks, or the first between them that is large enough.
-std::optional<uint64_t> CardBricks::freePlace(uint64_t words, uint64_t capacity) const {
+std::optional<uint64_t> CardBricks::freePlace(uint64_t words) const {
+  const uint64_t capacity = words_.bytes() / kWordBytes;
   uint64_t begin = 0;
   if (!by_place_.empty()) begin = by_place_.rbegin()->first + bricks_.at(by_place_.rbegin()->second).words;
   if (begin + words <= capacity) return begin;
@@ -144,26 +142,59 @@ std::optional<uint64_t> CardBricks::freePlace(uint64_t words, uint64_t capacity)
 }
 
 void CardBricks::put(uint32_t brick, const GeometryArrays<const float>& geometry,
-                     const VariableArrays<const float>& values) {
-  Stored& stored = bricks_.at(brick);
+                     const VariableArrays<const float>& values, const BrickPieces& pieces) {
   const size_t count = geometry.size();
-  CURVISPLAT_CHECK_OP(wordsOf(count), ==, stored.words);
-  uint64_t at = stored.begin * kWordBytes;
-  const auto add = [&](const auto* values_) {
-    words_.write(at, std::span(values_, count));
-    at += kWordBytes * count;
+  Known& known = known_[brick];
+  known = {};
+  for (const BrickPieces::Splat& splat : pieces.splats) {
+    known.splats.push_back(splat.number);
+    known.first.push_back(splat.first);
+  }
+  known.first.push_back(static_cast<uint32_t>(pieces.pieces.size()));
+  const uint64_t words = kStoredArrays * count + known.words();
+  const std::optional<uint64_t> begin = placeFor(words);
+  if (!begin) {
+    is_scattered_ = true;
+    return;
+  }
+  uint64_t at = *begin * kWordBytes;
+  const auto add = [&]<typename T>(std::span<const T> some) {
+    words_.write(at, some);
+    at += some.size_bytes();
   };
   for (const float* array :
        {geometry.x, geometry.y, geometry.z, geometry.axis0, geometry.axis1, geometry.axis2, geometry.shear10,
         geometry.shear20, geometry.shear21, geometry.weight})
-    add(array);
-  add(geometry.border_code);
-  add(geometry.growth_code);
+    add(std::span(array, count));
+  if (pieces.has_too_many)
+    add(std::span<const uint32_t>(std::vector<uint32_t>(count, kNoBorder)));
+  else
+    add(std::span(geometry.border_code, count));
+  add(std::span(geometry.growth_code, count));
   for (const float* array : {values.mean, values.slope0, values.slope1, values.slope2, values.variance})
-    add(array);
-  stored.has_pieces = std::any_of(geometry.border_code, geometry.border_code + count,
-                                  [](uint32_t code) { return code != kNoBorder; });
-  stored.filled = true;
+    add(std::span(array, count));
+  add(std::span(pieces.splats));
+  add(std::span(pieces.pieces));
+  bricks_[brick] = {*begin, words, frame_};
+  by_place_[*begin] = brick;
+}
+
+CardBricks::PieceRange CardBricks::piecesIn(const Known& known, const SplatRange& range) const {
+  const auto at = [&](uint32_t number) {
+    return static_cast<size_t>(std::lower_bound(known.splats.begin(), known.splats.end(), number) -
+                               known.splats.begin());
+  };
+  return {at(range.begin), at(range.end)};
+}
+
+size_t CardBricks::elementsOf(const StoredPart& part) const {
+  const Known& known = known_.at(part.brick);
+  size_t pieces = 0;
+  for (const SplatRange& range : part.ranges) {
+    const PieceRange in_range = piecesIn(known, range);
+    pieces += known.first[in_range.end] - known.first[in_range.begin];
+  }
+  return splatsOf(part) + kElementsAPiece * pieces;
 }
 
 void CardBricks::compile() {
@@ -213,18 +244,30 @@ void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& ke
                          std::span<const StoredPart> parts, const SplatTables& tables, float largest_scalar,
                          const CardBuffer& splats) {
   std::vector<ShaderPart> shader_parts;
-  std::vector<ShaderGroup> groups;
+  std::vector<ShaderGroup> groups, groups_of_pieces;
   uint32_t slot = 0;
   for (const StoredPart& part : parts) {
+    const Known& known = known_.at(part.brick);
     const auto number = static_cast<uint32_t>(shader_parts.size());
     shader_parts.push_back(
         shaderPart(part, settings.view, keys.linear(part.cell_min), bricks_.at(part.brick).begin));
-    for (const SplatRange& range : part.ranges)
+    shader_parts.back().splats_in_pieces = static_cast<uint32_t>(known.splats.size());
+    for (const SplatRange& range : part.ranges) {
       for (uint32_t first = range.begin; first < range.end; first += kProjectThreads) {
         groups.push_back({number, first, std::min(kProjectThreads, range.end - first), slot});
         slot += groups.back().count;
       }
+      const PieceRange pieces = piecesIn(known, range);
+      for (size_t first = pieces.begin; first < pieces.end; first += kProjectThreads) {
+        const size_t end = std::min(first + kProjectThreads, pieces.end);
+        groups_of_pieces.push_back(
+            {number, static_cast<uint32_t>(first), static_cast<uint32_t>(end - first), slot});
+        slot += kElementsAPiece * (known.first[end] - known.first[first]);
+      }
+    }
   }
+  const auto groups_of_splats = static_cast<uint32_t>(groups.size());
+  groups.insert(groups.end(), groups_of_pieces.begin(), groups_of_pieces.end());
   parts_.reserve(shader_parts.size() * sizeof(ShaderPart));
   parts_.write(0, std::span<const ShaderPart>(shader_parts));
   groups_.reserve(groups.size() * sizeof(ShaderGroup));
@@ -241,6 +284,9 @@ void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& ke
   setView(projecting, settings, keys.linear(glm::dvec3(0.0)));
   const auto count = static_cast<uint32_t>(groups.size());
   gl_.Uniform1ui(projecting.uniform("group_count"), count);
+  gl_.Uniform1ui(projecting.uniform("groups_of_splats"), groups_of_splats);
+  gl_.Uniform1f(projecting.uniform("reach"),
+                1.001f * static_cast<float>(largestReach(settings.view.low_pass_px2)));
   gl_.Uniform1f(projecting.uniform("largest_scalar"), largest_scalar);
   const CardBuffer* const buffers[] = {&splats, &words_, &parts_, &groups_, &fates_, &frames_};
   for (GLuint binding = 0; binding < std::size(buffers); ++binding) buffers[binding]->bind(binding);

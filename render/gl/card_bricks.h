@@ -1,15 +1,17 @@
 // The bricks that stay on the card, and their projection there (project_shader.h).
 //
-// All lie in one buffer, of which each has a piece. Where there is no piece that is large enough among those that
-// are free, all bricks are sent again. On the context's thread.
+// All lie in one buffer, each in a place of its own: its arrays, then its BrickPieces. Where no place is large enough among
+// those that are free, all bricks are sent again. On the context's thread.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "render/gl/card_buffer.h"
+#include "render/gl/project_shader.h"
 #include "render/gl/splat_tables.h"
 #include "render/project/brick_store.h"
 
@@ -25,11 +27,11 @@ class CardBricks {
   void open(uint64_t content);
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes);
   bool has(uint32_t brick) const;
-  bool hasPieces(uint32_t brick) const { return bricks_.at(brick).has_pieces; }
   void put(uint32_t brick, const GeometryArrays<const float>& geometry,
-           const VariableArrays<const float>& values);
-  /// Projects the parts into the first elements of `splats`, one for each of the parts' splats, drawn or not. `tables`
-  /// has those of the frame.
+           const VariableArrays<const float>& values, const BrickPieces& pieces);
+  /// How many elements project() writes for a part of a stored brick: one for each of its splats, and two for each piece.
+  size_t elementsOf(const StoredPart& part) const;
+  /// Projects the parts into the first elements of `splats`, drawn or not. `tables` has those of the frame.
   void project(const ProjectionSettings& settings, const DepthKeys& keys, std::span<const StoredPart> parts,
                const SplatTables& tables, float largest_scalar, const CardBuffer& splats);
   /// The counts of the last project(), for which it waits.
@@ -37,13 +39,27 @@ class CardBricks {
   uint64_t cardBytes() const { return words_.bytes() + parts_.bytes() + groups_.bytes(); }
 
  private:
+  /// What was once put, whether it still lies there or not.
+  struct Known {
+    std::vector<uint32_t> splats;  // numbers of those that have pieces
+    std::vector<uint32_t> first;   // [splat, and beyond the last] its first piece
+    uint64_t words() const {
+      return 4 * splats.size() + sizeof(StoredPiece) / sizeof(uint32_t) * first.back();
+    }
+  };
   struct Stored {
     uint64_t begin = 0, words = 0;
     uint64_t used = 0;  // the number of the frame that asked for it last
-    bool filled = false, has_pieces = false;
   };
-  bool place(std::span<const StoredPart> parts, uint64_t capacity);
-  std::optional<uint64_t> freePlace(uint64_t words, uint64_t capacity) const;
+  /// Splats with pieces: numbers in Known.
+  struct PieceRange {
+    size_t begin, end;
+  };
+  PieceRange piecesIn(const Known& known, const SplatRange& range) const;
+  uint64_t wordsOf(const StoredPart& part) const;
+  uint64_t mostElements(const StoredPart& part) const;
+  std::optional<uint64_t> placeFor(uint64_t words);
+  std::optional<uint64_t> freePlace(uint64_t words) const;
   const GlProgram& program(bool perspective);
   void setView(const GlProgram& program, const ProjectionSettings& settings,
                const DepthKeys::Linear& keys) const;
@@ -51,8 +67,10 @@ class CardBricks {
   const GlFunctions& gl_;
   std::array<std::optional<GlProgram>, 2> programs_;  // [perspective]
   CardBuffer words_, parts_, groups_, fates_, frames_;
+  std::map<uint32_t, Known> known_;        // by number
   std::map<uint32_t, Stored> bricks_;      // by number
   std::map<uint64_t, uint32_t> by_place_;  // by their begin
+  bool is_scattered_ = false;              // there was no place for a brick
   uint64_t content_ = 0, frame_ = 0;
 };
 

@@ -90,7 +90,7 @@ struct GlTilePainter::State final : BrickStore {
   GlTileLists lists;
   CardBuffer splats, closed;  // closed: pixels of each small tile, then of each large one, that take no more
   CardBricks bricks;
-  size_t stored = 0;  // splats that were projected from bricks, in `splats`; the batch follows
+  size_t stored = 0;  // elements that were projected from bricks, in `splats`; the batch follows
   std::function<void()> project_stored;
   GlObject windows, framebuffer, drawn;  // drawn: the windows, where the processor can read them
   ImageSize size{0, 0};
@@ -118,10 +118,9 @@ struct GlTilePainter::State final : BrickStore {
   uint64_t defaultBytes() const override { return default_bytes; }
   bool has(uint32_t brick) const override { return bricks.has(brick); }
   void put(uint32_t brick, const GeometryArrays<const float>& geometry,
-           const VariableArrays<const float>& values) override {
-    bricks.put(brick, geometry, values);
+           const VariableArrays<const float>& values, const BrickPieces& pieces) override {
+    bricks.put(brick, geometry, values, pieces);
   }
-  bool hasPieces(uint32_t brick) const override { return bricks.hasPieces(brick); }
   void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
                   std::span<const StoredPart> parts) override;
   ProjectionCounts counts() const override { return stored > 0 ? bricks.counts() : ProjectionCounts{}; }
@@ -242,8 +241,7 @@ BrickStore* GlTilePainter::store() {
 void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
                                       std::span<const StoredPart> parts) {
   const StageTimer timer(upload_s, "project bricks");
-  for (const StoredPart& part : parts)
-    for (const SplatRange& range : part.ranges) stored += range.size();
+  for (const StoredPart& part : parts) stored += bricks.elementsOf(part);
   project_stored = [this, &settings, &keys, parts] {
     timers.measure(kProject, [&] {
       bricks.project(settings, keys, parts, tables, SplatChooser::largestScalar(*table), splats);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "render/gl/splat_shader.h"
+#include "render/project/record_tags.h"
+#include "render/project/screen_splat.h"
 #include "render/project/tile_key.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
@@ -15,11 +17,13 @@ constexpr const char* kInputs = R"(
 layout(local_size_x = THREADS) in;
 layout(std430, binding = 0) writeonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
 layout(std430, binding = 1) readonly buffer Bricks { uint words[]; };
-layout(std430, binding = 2) readonly buffer Parts { uvec4 parts[]; };    // four a ShaderPart
+layout(std430, binding = 2) readonly buffer Parts { uvec4 parts[]; };    // five a ShaderPart
 layout(std430, binding = 3) readonly buffer Groups { uvec4 groups[]; };  // ShaderGroup
-layout(std430, binding = 4) buffer Fates { uint fates[]; };              // off screen, transparent, drawn, left to others
+layout(std430, binding = 4) buffer Fates { uint fates[]; };              // off screen, transparent, drawn, in pieces
 layout(std430, binding = 5) readonly buffer Frames { float frames[]; };  // growthFrames()
 uniform uint group_count;
+uniform uint groups_of_splats;  // the others are of splats in pieces
+uniform float reach;  // of SplatChooser
 uniform bool per_pixel;
 uniform float largest_scalar;
 uniform vec2 picture;     // pixels
@@ -87,6 +91,17 @@ vec2 planeOf(vec3 b0, vec3 b1, vec3 q) {
   return leans ? min(1.0, STEEPEST / steep) * slope : vec2(0.0);
 }
 
+// This is skewOfAxis(), for an axis that is `along` on the screen.
+vec4 skewOfAxis(vec2 along, float growth, Ellipse e) {
+  float p0 = along.x / e.l11, p1 = (along.y - e.l21 * p0) / e.l22;
+  return SKEW_OF_GROWTH * growth * vec4(p0 * p0 * p0, p0 * p0 * p1, p0 * p1 * p1, p1 * p1 * p1);
+}
+
+uint packSkew(vec4 t) {
+  ivec4 steps = ivec4(roundEven(clamp(t * 100.0, -127.0, 127.0)));
+  return uint(steps.x & 255) | uint(steps.y & 255) << 8 | uint(steps.z & 255) << 16 | uint(steps.w & 255) << 24;
+}
+
 // This is GrowthBlock::skewOf(); `a0` to `a2` are A's columns on the screen.
 uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
   if (code == 0u) return 0u;
@@ -96,12 +111,9 @@ uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
     float growth = GROWTH_STEP * float(int(code << (32u - GROWTH_BITS * (a + 1u))) >> (32 - int(GROWTH_BITS)));
     if (growth == 0.0) continue;
     uint at = frame + 3u * a;
-    vec2 along = frames[at] * a0 + frames[at + 1u] * a1 + frames[at + 2u] * a2;
-    float p0 = along.x / e.l11, p1 = (along.y - e.l21 * p0) / e.l22;
-    t += SKEW_OF_GROWTH * growth * vec4(p0 * p0 * p0, p0 * p0 * p1, p0 * p1 * p1, p1 * p1 * p1);
+    t += skewOfAxis(frames[at] * a0 + frames[at + 1u] * a1 + frames[at + 2u] * a2, growth, e);
   }
-  ivec4 steps = ivec4(roundEven(clamp(t * 100.0, -127.0, 127.0)));
-  return uint(steps.x & 255) | uint(steps.y & 255) << 8 | uint(steps.z & 255) << 16 | uint(steps.w & 255) << 24;
+  return packSkew(t);
 }
 
 // This is LocalLight::of(): diffuse and specular. `towards_viewer` has unit length.
@@ -163,72 +175,213 @@ uint firstKey(vec2 at, Ellipse e, inout uint key, inout vec2 slope) {
   return first;
 }
 
-// Returns which of `fates` counts it.
-uint project(uvec4 group, uint thread) {
-  uint slot = 4u * (group.w + thread), p = 4u * group.x;
-  uvec4 part0 = parts[p], part1 = parts[p + 1u];
-  splats[slot] = uvec4(0u, 0u, floatBitsToUint(-1.0), 0u);  // a record, which is not drawn
-  uint n = part0.y, at = part0.x + group.y + thread;
-  if (words[at + 10u * n] != NO_BORDER) return 3u;
 #define OF(array) uintBitsToFloat(words[at + uint(array) * n])
-  vec3 position = vec3(OF(0), OF(1), OF(2)), axis = vec3(OF(3), OF(4), OF(5)), shear = vec3(OF(6), OF(7), OF(8));
-  vec3 a0 = axis.x * vec3(1.0, shear.x, shear.y), a1 = axis.y * vec3(0.0, 1.0, shear.z), a2 = vec3(0.0, 0.0, axis.z);
-  float weight = OF(9), mean = OF(12), variance = OF(16);
-  vec3 w = vec3(OF(13), OF(14), OF(15));
-  vec3 row0 = right.xyz, row1 = down.xyz, to_depth = focal * forward.xyz;
+
+// Where a splat lies on the screen, and the map that is linear there: a PlacedPiece, with its depth as BrickProjector::depths().
+struct Place {
   vec2 pixel;
-  float depth;
+  float depth, volume;
+  vec3 row0, row1, to_depth;
+};
+
+Place placeOf(uint p, vec3 position) {
+  Place place;
 #if PERSPECTIVE
   vec4 part2 = uintBitsToFloat(parts[p + 2u]);
-  float order_base = uintBitsToFloat(parts[p + 3u].x);
   vec3 c = part2.xyz + vec3(dot(right.xyz, position), dot(down.xyz, position), dot(forward.xyz, position));
   vec2 tangent = c.xy / c.z;
-  pixel = middle + focal * tangent;
-  depth = (part2.w + dot(forward.xyz, position)) / (order_base * c.z);
-  row0 = focal / c.z * (right.xyz - tangent.x * forward.xyz);
-  row1 = focal / c.z * (down.xyz - tangent.y * forward.xyz);
-  to_depth /= c.z;
-  weight *= volume * focal * focal * length(c) / (c.z * c.z * c.z);
+  place.pixel = middle + focal * tangent;
+  place.depth = (part2.w + dot(forward.xyz, position)) / (uintBitsToFloat(parts[p + 3u].x) * c.z);
+  place.row0 = focal / c.z * (right.xyz - tangent.x * forward.xyz);
+  place.row1 = focal / c.z * (down.xyz - tangent.y * forward.xyz);
+  place.to_depth = focal / c.z * forward.xyz;
+  place.volume = volume * focal * focal * length(c) / (c.z * c.z * c.z);
 #else
-  pixel = uintBitsToFloat(part1.zw) + vec2(dot(row0, position), dot(row1, position));
-  depth = dot(forward.xyz, position);
-  weight *= volume;
+  place.row0 = right.xyz;
+  place.row1 = down.xyz;
+  place.to_depth = focal * forward.xyz;
+  place.pixel = uintBitsToFloat(parts[p + 1u].zw) + vec2(dot(place.row0, position), dot(place.row1, position));
+  place.depth = dot(forward.xyz, position);
+  place.volume = volume;
 #endif
-  vec3 b0 = vec3(dot(row0, a0), dot(row0, a1), dot(row0, a2)), b1 = vec3(dot(row1, a0), dot(row1, a1), dot(row1, a2));
-  Ellipse e = ellipseOf(b0, b1, w, variance, weight);
-  vec2 reach = SUPPORT * vec2(e.l11, abs(e.l21) + e.l22);
-  if (!(all(greaterThan(pixel + reach, vec2(0.0))) && all(lessThan(pixel - reach, picture)))) return 0u;
-  uint skew = skewOf(words[at + 11u * n], vec2(b0.x, b1.x), vec2(b0.y, b1.y), vec2(b0.z, b1.z), e);
+  return place;
+}
+
+vec3 rowOf(vec3 row, mat3 a) {
+  return vec3(dot(row, a[0]), dot(row, a[1]), dot(row, a[2]));
+}
+
+Ellipse ellipseAt(Place place, mat3 a, vec3 w, float variance, float weight) {
+  return ellipseOf(rowOf(place.row0, a), rowOf(place.row1, a), w, variance, weight * place.volume);
+}
+
+// A is the matrix of these columns.
+mat3 factorOf(vec3 axis, vec3 shear) {
+  return mat3(axis.x * vec3(1.0, shear.x, shear.y), axis.y * vec3(0.0, 1.0, shear.z), vec3(0.0, 0.0, axis.z));
+}
+
+// Writes a splat that can be seen, with its keys; `is_cut`: its record lies before it. As SplatChooser::chooseWith(). Returns
+// which of `fates` counts it.
+uint choose(uint slot, uint p, Place at, Ellipse e, float mean, uint skew, vec2 slope, vec2 lit_by, bool is_cut) {
+  vec2 reach_px = SUPPORT * vec2(e.l11, abs(e.l21) + e.l22);
+  if (!(all(greaterThan(at.pixel + reach_px, vec2(0.0))) && all(lessThan(at.pixel - reach_px, picture)))) return 0u;
   if (!per_pixel) e.slope0 = e.slope1 = e.half_width = e.along = 0.0;
-  float spread = SUPPORT * (abs(e.slope0) + abs(e.slope1)) + e.half_width;
+  float spread = SUPPORT * (abs(e.slope0) + abs(e.slope1)) + (is_cut ? CUT_REACH / 1.7320508 : 1.0) * e.half_width;
   if (!(abs(mean) + spread <= largest_scalar)) {
     e.slope0 = e.slope1 = e.half_width = e.along = spread = 0.0;
     mean = clamp(mean, -largest_scalar, largest_scalar);
   }
   e.amplitude = min(e.amplitude, 1e30);
   if (!(e.amplitude > 0.0) || isTransparent(mean - spread, mean + spread)) return 1u;
-  if (lit) {
+  if (lit) e.half_width = withLight(e.half_width, lit_by);
 #if PERSPECTIVE
-    vec3 towards_viewer = normalize(uintBitsToFloat(parts[p + 3u].yzw) - scale.xyz * position);
-#else
-    vec3 towards_viewer = viewer.xyz;
-#endif
-    e.half_width = withLight(e.half_width, litBy(w, axis, shear, towards_viewer));
-  }
-  vec2 slope = planeOf(b0, b1, vec3(dot(to_depth, a0), dot(to_depth, a1), dot(to_depth, a2)));
-#if PERSPECTIVE
-  slope *= key_steps_a_pixel * (uintBitsToFloat(part0.w) - depth);
+  slope *= key_steps_a_pixel * (uintBitsToFloat(parts[p].w) - at.depth);
 #else
   slope *= key_steps_a_pixel;
 #endif
-  uint key = uint(clamp(int(part0.z) + int(depth * key_steps), 0, MOST_KEY));
-  uint first = clamp(firstKey(pixel, e, key, slope), part1.x, part1.y);
-  key = clamp(key, part1.x, part1.y);
-  splats[slot] = floatBitsToUint(vec4(pixel, e.l11, e.l21));
-  splats[slot + 1u] = floatBitsToUint(vec4(e.l22, e.amplitude, mean, e.slope0));
+  uvec2 keys = parts[p + 1u].xy;
+  uint key = uint(clamp(int(parts[p].z) + int(at.depth * key_steps), 0, MOST_KEY));
+  uint first = clamp(firstKey(at.pixel, e, key, slope), keys.x, keys.y);
+  key = clamp(key, keys.x, keys.y);
+  splats[slot] = floatBitsToUint(vec4(at.pixel, e.l11, e.l21));
+  splats[slot + 1u] = floatBitsToUint(vec4(e.l22, is_cut ? -e.amplitude : e.amplitude, mean, e.slope0));
   splats[slot + 2u] = uvec4(floatBitsToUint(vec2(e.slope1, e.half_width)), skew, floatBitsToUint(e.along));
   splats[slot + 3u] = uvec4(key, first, floatBitsToUint(slope));
   return 2u;
+}
+
+vec2 litAt(uint p, vec3 position, vec3 w, vec3 axis, vec3 shear) {
+  if (!lit) return vec2(1.0, 0.0);
+#if PERSPECTIVE
+  vec3 towards_viewer = normalize(uintBitsToFloat(parts[p + 3u].yzw) - scale.xyz * position);
+#else
+  vec3 towards_viewer = viewer.xyz;
+#endif
+  return litBy(w, axis, shear, towards_viewer);
+}
+
+// A record, which is not drawn.
+void writeNothing(uint slot) {
+  splats[slot] = uvec4(0u, 0u, floatBitsToUint(-1.0), 0u);
+}
+
+// Returns which of `fates` counts it.
+uint project(uvec4 group, uint thread) {
+  uint slot = 4u * (group.w + thread), p = 5u * group.x;
+  uint n = parts[p].y, at = parts[p].x + group.y + thread;
+  writeNothing(slot);
+  if (words[at + 10u * n] != NO_BORDER) return 3u;  // it is drawn in pieces
+  vec3 position = vec3(OF(0), OF(1), OF(2)), axis = vec3(OF(3), OF(4), OF(5)), shear = vec3(OF(6), OF(7), OF(8));
+  vec3 w = vec3(OF(13), OF(14), OF(15));
+  mat3 a = factorOf(axis, shear);
+  Place place = placeOf(p, position);
+  vec3 b0 = rowOf(place.row0, a), b1 = rowOf(place.row1, a);
+  Ellipse e = ellipseOf(b0, b1, w, OF(16), OF(9) * place.volume);
+  uint skew = skewOf(words[at + 11u * n], vec2(b0.x, b1.x), vec2(b0.y, b1.y), vec2(b0.z, b1.z), e);
+  vec2 slope = planeOf(b0, b1, rowOf(place.to_depth, a));
+  return choose(slot, p, place, e, OF(12), skew, slope, litAt(p, position, w, axis, shear), false);
+}
+
+vec4 fourAt(uint word) {
+  return uintBitsToFloat(uvec4(words[word], words[word + 1u], words[word + 2u], words[word + 3u]));
+}
+
+// What the faces of a piece leave of it: as cutAtFaces() in plane_cuts.cpp, which explains it.
+struct Cut {
+  bool nothing;  // is left
+  int count;     // of the faces that cut
+  mat3 faces;    // a face a column
+  uint far_sides;
+};
+
+Cut cutAt(vec3 b0, vec3 b1, Ellipse e, uint piece, uint counts) {
+  Cut cut = Cut(false, 0, mat3(NO_FACE, 0.0, 0.0, NO_FACE, 0.0, 0.0, NO_FACE, 0.0, 0.0), 0u);
+  vec3 n = cross(b0, b1);
+  float s = dot(b0, b0) + dot(b1, b1), determinant = dot(n, n) + low_pass_px2 * (s + low_pass_px2);
+  for (uint f = 0u; f < (counts & 255u); ++f) {
+    vec4 face = fourAt(piece + 16u + 4u * f);
+    vec3 q = face.xyz, m = cross(n, q), c0 = cross(b0, q), c1 = cross(b1, q);
+    float h0 = dot(b0, q), h1 = dot(b1, q), nq = dot(n, q);
+    float g0 = (dot(b1, m) + low_pass_px2 * h0) / determinant, g1 = (low_pass_px2 * h1 - dot(b0, m)) / determinant;
+    float unseen = (low_pass_px2 * (low_pass_px2 * dot(q, q) + dot(c0, c0) + dot(c1, c1)) + nq * nq) / determinant;
+    if ((counts >> (8u + f) & 1u) != 0u && unseen > 0.5) continue;
+    vec3 at = vec3(face.w, e.l11 * g0 + e.l21 * g1, e.l22 * g1) / (KERNEL_SIGMA * sqrt(unseen));
+    float spread = SUPPORT * length(at.yz);
+    if (at.x + spread <= -CUT_REACH) cut.nothing = true;
+    if (at.x - spread >= CUT_REACH) continue;
+    if (nq > 0.0) cut.far_sides |= 1u << cut.count;
+    cut.faces[cut.count++] = at;
+  }
+  return cut;
+}
+
+float shareBelow(float x) {
+  return x * (0.9375 + x * x * (-0.625 + 0.1875 * x * x));
+}
+float shareAtCentre(Cut cut) {
+  float lo = -1.0, hi = 1.0;
+  for (int f = 0; f < 3; ++f) {
+    float at = cut.faces[f].x / CUT_REACH;
+    if ((cut.far_sides >> f & 1u) != 0u)
+      lo = max(lo, -at);
+    else
+      hi = min(hi, at);
+  }
+  return max(0.0, shareBelow(min(hi, 1.0)) - shareBelow(min(lo, 1.0)));
+}
+
+// A splat that is drawn in pieces: as choosePieces() and keepScalarOf() in projection.cpp. Returns which of `fates` counts it.
+uint projectPieces(uvec4 group, uint thread) {
+  uint p = 5u * group.x, n = parts[p].y, table = parts[p].x + STORED_ARRAYS * n, own = table + 4u * (group.y + thread);
+  uint first = words[own + 1u], count = words[own + 2u];
+  uint slot = 4u * (group.w + PIECE_ELEMENTS * (first - words[table + 4u * group.y + 1u]));
+  for (uint k = 0u; k < PIECE_ELEMENTS * count; ++k) writeNothing(slot + 4u * k);
+  uint at = parts[p].x + words[own];
+  vec3 position = vec3(OF(0), OF(1), OF(2)), axis = vec3(OF(3), OF(4), OF(5)), shear = vec3(OF(6), OF(7), OF(8));
+  vec3 w = vec3(OF(13), OF(14), OF(15));
+  float mean = OF(12), variance = OF(16), weight = OF(9), drawn = uintBitsToFloat(words[own + 3u]);
+  float most = reach * drawn + CUT_REACH * sqrt(drawn * drawn + variance);
+  if (isTransparent(mean - most, mean + most)) return 1u;
+  mat3 a = factorOf(axis, shear);
+  Place whole = placeOf(p, position);
+  vec2 slope = planeOf(rowOf(whole.row0, a), rowOf(whole.row1, a), rowOf(whole.to_depth, a));
+  vec2 lit_by = litAt(p, position, w, axis, shear);
+  uint best = 0u, piece = table + 4u * parts[p + 4u].x + 40u * first;
+  for (uint k = 0u; k < count; ++k, piece += 40u, slot += 4u * PIECE_ELEMENTS) {
+    vec4 q0 = fourAt(piece), q1 = fourAt(piece + 4u), q2 = fourAt(piece + 8u), q3 = fourAt(piece + 12u);
+    uint counts = words[piece + 11u];
+    mat3 factor = factorOf(q1.xyz, q2.xyz);
+    Place place = placeOf(p, q0.xyz);
+    vec3 b0 = rowOf(place.row0, factor), b1 = rowOf(place.row1, factor);
+    Ellipse e = ellipseOf(b0, b1, q3.xyz, variance, q1.w * place.volume);
+    Cut cut = cutAt(b0, b1, e, piece, counts);
+    if (cut.nothing) continue;
+    vec4 t = vec4(0.0);
+    for (uint g = 0u; g < (counts >> 16 & 255u); ++g) {
+      vec4 growth = fourAt(piece + 28u + 4u * g);
+      t += skewOfAxis(vec2(dot(place.row0, growth.xyz), dot(place.row1, growth.xyz)), growth.w, e);
+    }
+    float piece_mean = q0.w;
+    if (cut.count > 0) {  // its scalar stays that of the cell
+      Ellipse cell = ellipseAt(place, a, w, variance, weight);
+      vec2 off = -vec2(dot(place.row0, position - q0.xyz), dot(place.row1, position - q0.xyz));
+      float by_y = cell.slope1 / cell.l22, by_x = (cell.slope0 - cell.l21 * by_y) / cell.l11;
+      piece_mean = mean + by_x * off.x + by_y * off.y;
+      e.slope0 = e.l11 * by_x + e.l21 * by_y;
+      e.slope1 = e.l22 * by_y;
+      e.half_width = cell.half_width;
+      e.along = cell.along * shareAtCentre(cut);
+    }
+    uint fate = choose(slot + 4u, p, place, e, piece_mean, packSkew(t), slope, lit_by, cut.count > 0);
+    if (fate == 2u && cut.count > 0) {  // as ScreenCut::record()
+      float tag = -(FAR_SIDES_TAG * float(cut.far_sides) + CUT_TAG);
+      splats[slot] = floatBitsToUint(vec4(cut.faces[0].xy, tag, cut.faces[0].z));
+      splats[slot + 1u] = floatBitsToUint(vec4(cut.faces[1], cut.faces[2].x));
+      splats[slot + 2u] = uvec4(floatBitsToUint(cut.faces[2].yz), 0u, 0u);
+    }
+    best = max(best, fate);
+  }
+  return best;
 }
 
 void main() {
@@ -237,7 +390,10 @@ void main() {
   memoryBarrierShared();
   barrier();
   uvec4 group = number < group_count ? groups[number] : uvec4(0u);
-  if (thread < group.z) atomicAdd(group_fates[project(group, thread)], 1u);
+  if (thread < group.z) {
+    uint fate = number < groups_of_splats ? project(group, thread) : projectPieces(group, thread);
+    atomicAdd(group_fates[fate], 1u);
+  }
   memoryBarrierShared();
   barrier();
   if (thread < 4u && group_fates[thread] > 0u) atomicAdd(fates[thread], group_fates[thread]);
@@ -259,7 +415,13 @@ std::string projectShader(bool perspective) {
       "#define SKEW_OF_GROWTH {:.9g}\n#define MOST_KEY {}\n",
       kGrowthFrameShift, (1u << kGrowthFrameBits) - 1, kGrowthBits, kGrowthStep, kSkewOfGrowth,
       INT32_MAX / 2);
-  return fmt::format("#version 430 core\n{}{}{}{}{}", constants, growth, splatUniforms(), kInputs, kProject);
+  const std::string pieces = fmt::format(
+      "#define STORED_ARRAYS {}u\n#define PIECE_ELEMENTS {}u\n#define NO_FACE {:.1f}\n#define CUT_REACH "
+      "{:.9g}\n"
+      "#define CUT_TAG {:.1f}\n#define FAR_SIDES_TAG {:.1f}\n",
+      kStoredArrays, kElementsAPiece, ScreenCut::kNoFace, ScreenCut::kReach, kCutTag, kFarSidesTag);
+  return fmt::format("#version 430 core\n{}{}{}{}{}{}", constants, growth, pieces, splatUniforms(), kInputs,
+                     kProject);
 }
 
 }  // namespace curvisplat

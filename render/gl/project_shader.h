@@ -1,5 +1,5 @@
-// The GLSL that projects stored bricks: what projection.cpp does with splats that are drawn as they are, in orthographic
-// views or in perspective, and what DepthKeys::setKeys() does with their keys.
+// The GLSL that projects stored bricks: what projection.cpp does with splats that are drawn as they are or in pieces at
+// borders, in orthographic views or in perspective, and what DepthKeys::setKeys() does with their keys.
 #pragma once
 
 #include <cstddef>
@@ -22,10 +22,15 @@ struct ShaderPart {
   float x, y;                                                 // OrthographicMap
   float origin_x, origin_y, origin_z, from_base, order_base;  // PerspectiveMap
   float eye_x, eye_y, eye_z;                                  // LocalLight, in perspective
+  uint32_t splats_in_pieces;                                  // BrickPieces::splats, which follow the arrays
+  uint32_t unused[3];
 };
-static_assert(sizeof(ShaderPart) == 64);
+static_assert(sizeof(ShaderPart) == 80);
 
-/// A work group's splats: `count` of a part, from `first` of its brick on, and where they go.
+/// What a piece is drawn as: its ScreenCut, or nothing, and itself.
+inline constexpr uint32_t kElementsAPiece = 2;
+
+/// A work group's splats: `count` of a part, from `first` of its brick on, or of those in pieces; and where they go.
 struct ShaderGroup {
   uint32_t part, first, count, slot;
 };

@@ -234,7 +234,8 @@ std::string tileListShader(TileListStep step) {
       "#define PLACES {4}\n#define SUPPORT {5:.9g}\n#define MAX_STEPS {6:.1f}\nlayout(local_size_x = {0}) "
       "in;\n{7}{8}{9}",
       sorts ? kSortThreads : kListThreads, kMaxGroups, kSortedAtOnce, kTilesAChunk, sorts ? "readonly" : "",
-      static_cast<float>(kKernelSupport), kMaxSteps, step == TileListStep::kScan ? "" : kPlaces, sorts ? "" : kSums, body);
+      static_cast<float>(kKernelSupport), kMaxSteps, step == TileListStep::kScan ? "" : kPlaces,
+      sorts ? "" : kSums, body);
 }
 
 }  // namespace curvisplat

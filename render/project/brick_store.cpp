@@ -5,8 +5,78 @@
 
 #include <algorithm>
 #include <numbers>
+#include <optional>
+
+#include "render/project/splat_pieces.h"
+#include "stream/base/error.h"
+#include "stream/model/border_code.h"
 
 namespace curvisplat {
+
+namespace {
+
+StoredPiece storedPiece(const SplatPiece& piece) {
+  const Shape& s = piece.shape;
+  CURVISPLAT_CHECK_OP(static_cast<size_t>(piece.faces.count), <=, StoredPiece::kMaxFaces);
+  StoredPiece out{};
+  out.x = piece.position.x;
+  out.y = piece.position.y;
+  out.z = piece.position.z;
+  out.mean = piece.mean;
+  out.axis0 = s.axis0;
+  out.axis1 = s.axis1;
+  out.axis2 = s.axis2;
+  out.weight = piece.weight;
+  out.shear10 = s.shear10;
+  out.shear20 = s.shear20;
+  out.shear21 = s.shear21;
+  out.counts = static_cast<uint32_t>(piece.faces.count) | static_cast<uint32_t>(piece.growth.count) << 16;
+  out.slope0 = piece.slope.w0;
+  out.slope1 = piece.slope.w1;
+  out.slope2 = piece.slope.w2;
+  for (size_t n = 0; n < static_cast<size_t>(piece.faces.count); ++n) {
+    const CutFace& face = piece.faces.face[n];
+    out.faces[n] = {face.inward.x, face.inward.y, face.inward.z, face.distance};
+    if (face.edge_on) out.counts |= 1u << (8 + n);
+  }
+  for (size_t n = 0; n < piece.growth.count; ++n) {
+    const glm::vec3& along = piece.growth.along[n];
+    out.growth[n] = {along.x, along.y, along.z, piece.growth.growth[n]};
+  }
+  return out;
+}
+
+/// Nothing if there are more than BrickProjector draws.
+std::optional<BrickPieces> dividedBy(const BorderStyle& borders, const GeometryArrays<const float>& geometry,
+                                     const VariableArrays<const float>& values) {
+  BrickPieces out;
+  BorderPieces parts;
+  size_t further = 0;  // records beside one for each splat
+  for (uint32_t i = 0; i < geometry.size(); ++i) {
+    const uint32_t code = geometry.border_code[i];
+    if (code == kNoBorder) continue;
+    const InwardAxes inward = inwardAxes(code);
+    const SplatPiece whole = wholeOf(geometry, values, i);
+    const size_t count = partsAtBorder(whole, inward, layersOf(code), borders, parts);
+    const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
+    out.splats.push_back({i, static_cast<uint32_t>(out.pieces.size()), static_cast<uint32_t>(count),
+                          static_cast<float>(drawnSlope(slope, inward))});
+    for (size_t n = 0; n < count; ++n) out.pieces.push_back(storedPiece(parts[n]));
+    further += count - 1;
+    if (further > BrickProjector::kMaxPieces) return {};
+  }
+  return out;
+}
+
+}  // namespace
+
+BrickPieces BrickPieces::of(const GeometryArrays<const float>& geometry,
+                            const VariableArrays<const float>& values, const BorderStyle& borders) {
+  if (auto divided = dividedBy(borders, geometry, values)) return *std::move(divided);
+  if (isOfPairs(borders))
+    if (auto divided = dividedBy(kWholeCellStyle, geometry, values)) return *std::move(divided);
+  return {{}, {}, true};
+}
 
 bool BrickStore::canDraw(const ProjectionSettings& settings) {
   return !settings.layers && !settings.gradient;

@@ -172,17 +172,6 @@ struct Cutting {
   LocalLayers layers;
 };
 
-SplatPiece wholeOf(const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
-                   size_t i) {
-  return {{geometry.x[i], geometry.y[i], geometry.z[i]},
-          shapeOf(geometry, i),
-          slopeOf(variable, i),
-          variable.mean[i],
-          geometry.weight[i],
-          {},
-          growthAxes(shapeOf(geometry, i), geometry.growth_code[i])};
-}
-
 /// The projection of one brick by one map.
 struct BrickPass {
   const BrickArrays& brick;
@@ -190,7 +179,6 @@ struct BrickPass {
   const SlopeRules& rules;
   SplatChooser& chooser;
   ProjectionCounts& counts;
-  bool only_pieces;
   CutBudget left = {};
   BorderPieces parts = {},
                coloured_parts = {};  // of the splat in hand: clearing them takes as long as filling them
@@ -305,16 +293,12 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
   std::array<ClipSide, kBlock> sides{};
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
-    const uint32_t* const codes = geometry.border_code + begin;
-    const auto is_piece = [](uint32_t code) { return code != kNoBorder; };
-    if (pass.only_pieces && std::none_of(codes, codes + count, is_piece)) continue;
     computeBlock(map, geometry, variable, begin, count, block);
     computeSkews(map, geometry, begin, count, growth, block);
     computePlanes(map, geometry, begin, count, planes);
     if (!cutting.clip.empty()) cutting.clip.sidesOf(geometry, begin, count, sides);
     for (size_t n = 0; n < count; ++n) {
       const size_t i = begin + n;
-      if (pass.only_pieces && !is_piece(codes[n])) continue;
       ++counts.read;
       SplatCutting how{cutting.borders ? geometry.border_code[i] : kNoBorder, sides[n] == ClipSide::kAcross,
                        false, planes.of(n)};
@@ -407,7 +391,7 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   SplatChooser chooser(settings.view, largestReach(settings.view.low_pass_px2),
                        {settings.per_pixel, settings.lit()}, table, {splats_, depths_});
   const auto projectAll = [&](const auto& map) {
-    BrickPass pass{brick, cutting, rules, chooser, counts_, only_pieces_};
+    BrickPass pass{brick, cutting, rules, chooser, counts_};
     return std::all_of(ranges.begin(), ranges.end(),
                        [&](const SplatRange& range) { return projectRange(map, pass, range); });
   };

@@ -98,9 +98,6 @@ class BrickProjector {
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
 
-  /// Lets only splats with a border code be projected from now on: the others are drawn from a BrickStore.
-  void setOnlyPieces(bool only_pieces) { only_pieces_ = only_pieces; }
-
   /// Leaves out what touches none of the tiles. To be called after project(): how splats are cut must not
   /// depend on the tiles.
   void keepTouching(const TileSet& tiles);
@@ -119,7 +116,6 @@ class BrickProjector {
   std::vector<ScreenSplat> splats_;
   std::vector<float> depths_;
   ProjectionCounts counts_;
-  bool only_pieces_ = false;
 };
 
 /// How far, in multiples of the largest slope (BrickVariable), a mean can reach over the footprints of a

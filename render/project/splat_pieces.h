@@ -153,6 +153,18 @@ struct SplatPiece {
   GrowthAxes growth = {};  // none of what perspective cuts
 };
 
+/// Splat `i`, which is not cut.
+inline SplatPiece wholeOf(const GeometryArrays<const float>& geometry,
+                          const VariableArrays<const float>& variable, size_t i) {
+  return {{geometry.x[i], geometry.y[i], geometry.z[i]},
+          shapeOf(geometry, i),
+          slopeOf(variable, i),
+          variable.mean[i],
+          geometry.weight[i],
+          {},
+          growthAxes(shapeOf(geometry, i), geometry.growth_code[i])};
+}
+
 /// Halves `piece` along `column` (0..2) of A: that column, the slope along it and the weight become half,
 /// and the two centres lie a quarter of the column from the old one, with means a quarter of the slope apart
 /// from it. Merging the two (DESIGN.md, "Merging") gives the splat back exactly, residual variance included.

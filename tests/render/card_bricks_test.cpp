@@ -21,7 +21,11 @@ class CardBricksTest : public ::testing::Test {
  protected:
   void SetUp() override {
     writeRandomCache(folder_ / "a.splats", 3);
-    cache_ = std::make_unique<CacheReader>(folder_ / "a.splats");
+    open("a.splats");
+  }
+  void open(const char* name) {
+    egl_.reset();
+    cache_ = std::make_unique<CacheReader>(folder_ / name);
     try {
       egl_ = rendererBy(Backend::kEgl);
     } catch (const Error& error) {
@@ -83,6 +87,23 @@ TEST_F(CardBricksTest, AreDrawnAsTheProcessorDrawsThem) {
   EXPECT_GT(compare("coarse", camera("iso"), [](FrameOptions& o) { o.lod_pixels = 4; }), 0u);
 }
 
+TEST_F(CardBricksTest, DrawSplatsAtBordersInTheSamePieces) {
+  for (const bool cells : {false, true}) {
+    const char* const name = cells ? "cells.splats" : "nodes.splats";
+    writeRandomCacheWithBorders(folder_ / name, 7, cells);
+    open(name);
+    const auto nothing = [](FrameOptions&) {};
+    const uint64_t all = compare(name, camera("iso"), nothing);
+    EXPECT_GT(all, 10'000u);
+    EXPECT_EQ(compare(name, camera("iso", Projection::kPerspective), nothing), all);
+    compare(name, camera("-x"), [](FrameOptions& o) { o.classification = Classification::kFlat; });
+    compare(name, camera("+y"), [](FrameOptions& o) { o.scale = {1, 2, 0.5}; });
+    const auto light = [](FrameOptions& o) { o.light = Light{0.2f, 0.8f, 0.4f, glm::dvec3(1, 0.4, 0.6)}; };
+    compare(name, camera("iso", Projection::kPerspective), light);
+    compare(name, camera("iso"), [](FrameOptions& o) { o.lod_pixels = 4; });
+  }
+}
+
 TEST_F(CardBricksTest, LeaveToTheProcessorWhatIsCut) {
   const auto half = [this](FrameOptions& o) { o.clip_planes = {{middle(), {1, 0.2, 0}}}; };
   EXPECT_GT(compare("clip plane", camera("iso"), half), 0u);
@@ -95,6 +116,8 @@ TEST_F(CardBricksTest, LeaveToTheProcessorWhatIsCut) {
 }
 
 TEST_F(CardBricksTest, GiveTheSameBitsForAnyHistoryThreadsAndMemory) {
+  writeRandomCacheWithBorders(folder_ / "borders.splats", 5, false);
+  open("borders.splats");
   for (const uint64_t card_memory : {2 * kMiB, 64 * kMiB}) {
     FrameStatistics statistics;
     const Image iso = egl_->render(camera("iso"), options(card_memory), statistics);
@@ -133,6 +156,8 @@ TEST_F(CardBricksTest, KeepWhatLiesFarOutsideOfTheFunction) {
 }
 
 TEST_F(CardBricksTest, GiveMemoryUpWhereThereIsLessOfIt) {
+  writeRandomCacheWithBorders(folder_ / "borders.splats", 5, true);
+  open("borders.splats");
   FrameStatistics all, few;
   egl_->render(camera("iso"), options(64 * kMiB), all);
   egl_->render(camera("iso"), options(2 * kMiB), few);

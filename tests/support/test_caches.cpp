@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <random>
@@ -12,6 +13,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_writer.h"
+#include "stream/model/border_code.h"
 
 namespace curvisplat {
 namespace {
@@ -27,13 +29,37 @@ BrickSplats byOctant(const BrickSplats& brick) {
     sorted.positions[n] = brick.positions[order[n]];
     sorted.splats[n] = brick.splats[order[n]];
     sorted.variables[0][n] = brick.variables[0][order[n]];
+    if (!brick.border_codes.empty()) sorted.border_codes[n] = brick.border_codes[order[n]];
   }
   return sorted;
 }
 
-}  // namespace
+/// A code of any of the five forms.
+uint32_t randomBorderCode(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  const auto direction = [&] {
+    return glm::normalize(glm::dvec3(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5));
+  };
+  const glm::dvec3 first = direction(), second = glm::normalize(glm::cross(first, direction()));
+  const std::array<glm::dvec3, 3> axes{first, second, glm::cross(first, second)};
+  const size_t count = 1 + random() % 3;
+  switch (random() % 5) {
+    case 0:
+      return packBorderCode({axes.data(), count}, static_cast<uint32_t>(random() % (1u << count)));
+    case 1:
+      return packLayerCode(first, 0.5 + unit(random));
+    case 2:
+      return packMergedCode(first, 0.2 + 0.6 * unit(random), 0.8 + 2 * unit(random));
+    case 3:
+      return packLayersCode({axes.data(), 2 + random() % 2}, random() % 2);
+    default:
+      return packPlateCode(first);
+  }
+}
 
-void writeRandomCache(const std::filesystem::path& path, uint64_t seed, size_t most_splats) {
+enum class Borders : uint8_t { kNone, kOfNodes, kOfCells };
+
+void writeRandom(const std::filesystem::path& path, uint64_t seed, size_t most_splats, Borders borders) {
   const RootCube root{{-1, 2, 3}, 4};
   CacheWriter writer(path, false, root, {{0, "f", "", -1, 1}});
   std::mt19937_64 random(seed);
@@ -44,6 +70,10 @@ void writeRandomCache(const std::filesystem::path& path, uint64_t seed, size_t m
     like.leaf = leaf;
     like.splats = 1 + random() % (random() % 3 == 0 ? most_splats : most_splats / 20);
     BrickSplats brick = randomBrick(like, cell, random());
+    if (borders != Borders::kNone) {
+      brick.border_codes.assign(brick.size(), kNoBorder);
+      for (size_t n = 0; n < brick.size(); n += 3) brick.border_codes[n] = randomBorderCode(random);
+    }
     if (!leaf) brick = byOctant(brick);
     writer.append(encodeBrick(root, brick), error);
     return brick.size();
@@ -67,7 +97,20 @@ void writeRandomCache(const std::filesystem::path& path, uint64_t seed, size_t m
   manifest.upper = root.min + root.size;
   manifest.blocks = {{"block 1", nodes, 1, 1}};
   manifest.nodes = nodes;
+  manifest.cells = borders == Borders::kOfCells;
+  if (borders != Borders::kNone) manifest.requirements = {kBorderFaces, kFaceLayers, kMergedBorders, kPlates};
+  if (manifest.cells) manifest.requirements.push_back(kBorderPairs);
   writer.finish(manifest);
+}
+
+}  // namespace
+
+void writeRandomCache(const std::filesystem::path& path, uint64_t seed, size_t most_splats) {
+  writeRandom(path, seed, most_splats, Borders::kNone);
+}
+
+void writeRandomCacheWithBorders(const std::filesystem::path& path, uint64_t seed, bool cells) {
+  writeRandom(path, seed, 3000, cells ? Borders::kOfCells : Borders::kOfNodes);
 }
 
 namespace {
