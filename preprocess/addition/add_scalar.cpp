@@ -162,7 +162,7 @@ class Addition {
 
   void checkSurvey() const {
     const uint64_t missing = survey_.blanked.by_value + survey_.blanked.not_finite;
-    // Of a mesh, samples that lost all their cells to blanked ones have no splat, either.
+    // Samples of a mesh that lost all their cells to blanked ones have no splat, either.
     const bool restricted = mesh_ && mesh_->restricted();
     if (restricted ? survey_.blanked.by_grid < manifest().blanked_nodes
                    : survey_.blanked.by_grid != manifest().blanked_nodes)

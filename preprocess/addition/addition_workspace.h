@@ -1,6 +1,6 @@
-// Begins an addition of scalars or of a time step: the cache's lock and a folder for temporary
-// files, which it holds while it works, and checks that the grid is the cache's. Of several ranks that add
-// together, rank 0 holds the lock, and each has a folder of its own in rank 0's. One thread calls.
+// Begins an addition of scalars or of a time step: the cache's lock and a folder for temporary files, which
+// it holds while it works, and checks that the grid is the cache's. If several ranks add together, rank 0
+// holds the lock, and each has a folder of its own in rank 0's. One thread calls.
 #pragma once
 
 #include <filesystem>

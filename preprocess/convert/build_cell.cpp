@@ -389,8 +389,8 @@ BuiltCell buildFromChildren(const RootCube& root, const std::vector<ValueCoding>
   const size_t variables = codings.size();
   std::array<MergedOctant, 8> octants;
   tbb::enumerable_thread_specific<OctantMerger> mergers([&] { return OctantMerger(root, variables); });
-  // Of its own: where a loop around this one is cancelled, this one would end early as well, with children
-  // missing.
+  // This loop has a context of its own: otherwise it would end early, with children missing, if a loop around
+  // it is cancelled.
   tbb::task_group_context own(tbb::task_group_context::isolated);
   parallelFor(
       size_t{0}, size_t{8},

@@ -1,5 +1,5 @@
-// The pass that makes splats and sends each to the bucket of the cell that it lies in. Of a structured grid it
-// reads the nodes once more, with a halo; those of block faces go through the seam merger first.
+// The pass that makes splats and sends each to the bucket of the cell that it lies in. It reads the nodes of
+// a structured grid once more, with a halo; those of block faces go through the seam merger first.
 #pragma once
 
 #include <cstddef>

@@ -1,8 +1,8 @@
 // The nodes of a grid's faces, in a temporary file: read from the grid in one pass, and then as often as levels of
 // detail need them.
 //
-// Of cell-centred data the scalars are those of the layer of cells behind the face, and a node's is the mean of
-// those around it.
+// Scalars of cell-centred data are those of the layer of cells behind the face: a node has the mean of the
+// cells around it.
 #pragma once
 
 #include <array>
@@ -64,7 +64,8 @@ class FaceSpool {
   LatticeRow row(size_t face, uint64_t v, const RowRange& range = {}) const;
   /// Every `stride`-th node of the range, from its first on, and its last.
   LatticeRow thinnedRow(size_t face, uint64_t v, const RowRange& range, uint32_t stride) const;
-  /// Whether the cells behind a range of the quads of a row are there; nodes decide otherwise. Of cells only.
+  /// Whether the cells behind a range of the quads of a row exist. For cell-centred data only; otherwise
+  /// nodes decide.
   std::vector<uint8_t> cellsOfRow(size_t face, uint64_t v, const RowRange& quads) const;
   bool ofCells() const { return reader_.centring() == Centring::kCell; }
 

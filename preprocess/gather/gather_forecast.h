@@ -1,7 +1,7 @@
 // How many bytes CornerGather, and PointSums or CellSlopes behind it, will write to temporary files, known
 // before anything is written: found from the cells' corners alone, by the same decisions about pages and
-// streams. boundOfGather() reads a few chunks of cells, forecastOfGather() all of them. Of the faces that
-// wait for their second cell, WaitingFaces follows only a share. One thread calls.
+// streams. boundOfGather() reads a few chunks of cells, forecastOfGather() all of them. WaitingFaces follows
+// only a share of the faces that wait for their second cell. One thread calls.
 #pragma once
 
 #include <cstdint>

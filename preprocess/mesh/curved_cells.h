@@ -1,10 +1,11 @@
 // Cells of higher order: where their nodes are in the cell, and the linear cells into which they are cut.
 //
-// A complete cell of order n has nodes at the lattice (i, j, k) / n of its parameters: a hexahedron becomes n^3 hexahedra, a
-// wedge wedges, a tetrahedron tetrahedra, each with corners at nodes, where its polynomial has exactly the positions and
-// values that are stored. Of one whose nodes are at the corners and the middles of its edges (20 nodes of a hexahedron, 15 of a
-// wedge, 13 of a pyramid) a piece is cut off at each corner, and a polyhedron of the middles is left. Faces are cut alike from
-// both sides. Nodes are in VTK's order. Pure: any thread.
+// A complete cell of order n has nodes at the lattice (i, j, k) / n of its parameters: a hexahedron becomes
+// n^3 hexahedra, a wedge wedges, a tetrahedron tetrahedra, each with corners at nodes, where its polynomial
+// has exactly the positions and values that are stored. A cell with nodes at its corners and the middles of
+// its edges (a hexahedron of 20 nodes, a wedge of 15, a pyramid of 13) loses a piece at each corner, and a
+// polyhedron of the middles is left. Faces are cut alike from both sides. Nodes are in VTK's order. Pure: any
+// thread.
 #pragma once
 
 #include <array>
@@ -21,8 +22,8 @@ inline constexpr size_t kMaxCurveOrder = 10;
 /// The curve of a cell with that many nodes; of order 0 if there is no such one.
 CellCurve curveOf(CellKind shape, size_t nodes);
 
-/// (i, j, k) of each node: from 0 to the order. Of wedges and tetrahedra i + j (+ k) is the order at most; of a pyramid i and j are
-/// the order less k at most.
+/// (i, j, k) of each node: from 0 to the order. In wedges and tetrahedra i + j (+ k) is the order at most; in
+/// a pyramid i and j are the order less k at most.
 std::vector<std::array<uint8_t, 3>> nodesOf(CellKind shape, CellCurve curve);
 
 /// Appends a cell with its nodes in VTK's order: one of higher order if it has more of them than corners. If there is no such one, its

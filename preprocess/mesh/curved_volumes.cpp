@@ -107,7 +107,8 @@ glm::dvec3 slopesOf(CellKind shape, CellCurve curve, const Place& node, const gl
     return {along[0][1] * along[1][0] * along[2][0], along[0][0] * along[1][1] * along[2][0],
             along[0][0] * along[1][0] * along[2][1]};
   }
-  // Of a simplex: a product of one polynomial for each barycentric coordinate, zero at the nodes below its own.
+  // A simplex has a product of one polynomial for each barycentric coordinate, zero at the nodes below its
+  // own.
   const size_t axes = shape == CellKind::kWedge ? 2 : 3;
   std::array<double, 4> value{1, 1, 1, 1}, slope{};
   double rest = order;

@@ -155,7 +155,7 @@ void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own
     }
     const double second = reach > 0 ? 3 * 2 * rest / reach : 0.0;  // of all three columns
     const double mean = std::clamp<double>(own[field] + kBend * second, least, most);
-    // Of h = S g, the slope A⁻¹ h is Aᵀ g.
+    // Since h = S g, the slope A⁻¹ h is Aᵀ g.
     values[field] = {mean, gradients[field] * splat.splat.factor(), 0.0};
   }
 }

@@ -174,7 +174,7 @@ std::vector<size_t> groupsAtJoints(std::span<const NodeSplat> parts, JointFrames
   return group;
 }
 
-/// A splat of the layer behind a seam. Of a probe, its line alone: it tells the splat that waits for it
+/// Makes a splat of the layer behind a seam. A probe gives only its line, to the splat that waits for it
 /// (seams.h).
 void goOnBehind(std::span<const NodeSplat* const> parts, std::span<const JointSide> sides, NodeSplat& behind,
                 std::span<SplatScalar> values) {

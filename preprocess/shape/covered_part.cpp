@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kPartVariance = 1.0 / 256;  // of a sixteenth of a cell, times 12
 
-// A part is cut at its end like the half cell at a border. Of slices of whole cells, and of those that are
-// nearly whole, too few points say where that is.
+// A part is cut at its end like the half cell at a border. In slices of whole cells, and in those that are
+// nearly whole, too few points say where that end is.
 constexpr double kMinCut = 0.1;     // of the cell
 constexpr double kMinShift = 1e-3;  // of the middle, in cells: the rest may lie around what is covered
 

@@ -99,8 +99,8 @@ void setShape(Splat& splat, const Symmetric3& s, double smallest);
 
 /// A⁻¹ v: a vector in the frame of a splat, where its cell is the unit cube.
 glm::dvec3 inFrameOf(const Splat& splat, const glm::dvec3& v);
-/// A⁻ᵀ w. Of a slope: the gradient, the change per world unit. Of a unit vector of the frame: the normal of
-/// the cell's face at right angles to it, one over the cell's thickness long.
+/// A⁻ᵀ w: for a slope w the gradient, its change per world unit; for a unit vector w of the frame the normal
+/// of the cell's face at right angles to it, one over the cell's thickness long.
 glm::dvec3 gradientOf(const Splat& splat, const glm::dvec3& w);
 
 /// S = A Aᵀ of a splat.
@@ -110,8 +110,8 @@ Symmetric3 shapeMatrix(const Splat& splat);
 Symmetric3 raisedTo(const Symmetric3& s, double least);
 
 /// The singular values of `m`, largest first: the semi-axes of the ellipsoid that `m` makes of the unit
-/// sphere. Of a splat: singularValues(splat.factor()). Exact to a few units in the last place of each for
-/// matrices whose columns are badly scaled, and of the largest otherwise.
+/// sphere. Those of a splat are singularValues(splat.factor()). Exact to a few units in the last place of
+/// each for matrices whose columns are badly scaled, and of the largest otherwise.
 std::array<double, 3> singularValues(const glm::dmat3& m);
 
 /// True only if every singular value of `a` is above kAxisFloor times the largest: with singular values s0

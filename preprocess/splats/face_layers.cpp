@@ -100,7 +100,7 @@ std::optional<CutBehindFace> FacesBehind::cutAtOne(const NodeBehind& behind, int
                                                    const Splat& splat) const {
   const Face face = faceOf(behind, axis);
   if (face.normal == glm::dvec3(0.0)) return std::nullopt;
-  // Of a plane n · (x - X0) = 0, A⁻¹ (x - X0) is at right angles to Aᵀ n.
+  // In a plane n · (x - X0) = 0, A⁻¹ (x - X0) is at right angles to Aᵀ n.
   const glm::dvec3 in_frame = face.normal * splat.factor();
   const double length = glm::length(in_frame);
   const uint32_t code =

@@ -458,7 +458,8 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
          : frame.determinant() < 0 ? out_.left_handed
                                    : out_.right_handed) += 1;
         if (frame.kIsPlain && corrections_.faces && layers != Layers{}) {
-          // Of one face that the node is behind, or of one of several without that correction, the code has the exact plane.
+          // The code has the exact plane of the one face that the node is behind, or of one of several
+          // without that correction.
           const NodeBehind behind{at, neighbours, layers};
           const auto several =
               std::count_if(layers.begin(), layers.end(), [](int side) { return side != 0; });

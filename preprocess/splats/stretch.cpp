@@ -53,8 +53,8 @@ class LineEnd {
   /// are known.
   LineEnd(const NodePositions& nodes, ptrdiff_t end, ptrdiff_t inwards, int samples)
       : nodes_(nodes), end_(end), inwards_(inwards) {
-    // The end node's extent is of one side only. Of a line that is steady it is (1 + 1/g)/2 as long, with
-    // neighbours g times as far apart from step to step.
+    // The end node's extent is of one side only. On a steady line, whose neighbours are g times as far apart
+    // from step to step, it is (1 + 1/g)/2 as long.
     own_ = 4 * nodes_.squaredDistance(end_, end_ + inwards_);
     if (samples <= kStretchReach) return;
     growth_ = steadyGrowth(inner(1), inner(2), inner(3));

@@ -97,7 +97,7 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
       stretchNodes({lattice_.x, lattice_.y, lattice_.z}, row + static_cast<ptrdiff_t>(begin), strides[axis],
                    end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)}, fit_);
     };
-    // Of those with neighbours in the block, several at once as far as none of these is blank.
+    // Nodes with neighbours in the block are done several at once, as far as none of these is blank.
     uint64_t first = i0_, last = i1_;
     bool any_blank = false;
     if (axis == 0) {

@@ -233,7 +233,7 @@ class OverlapSearch {
     };
     const auto goOn = [&](uint64_t cell) { return Place{part.block, cell, sampling->planeOf(cell)}; };
     points.reserve(most);
-    // Of as many blocks as have points enough.
+    // Slabs of as many blocks as it takes to have enough points.
     std::vector<Slab> wanted;
     uint32_t end = from.block;
     for (uint64_t count = 0; end < blocks_.size() && count <= most; ++end) {

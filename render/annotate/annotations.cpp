@@ -341,7 +341,7 @@ Image annotated(Image data, const Annotations& annotations, const AnnotatedScene
 }
 
 uint64_t annotatedBytes(ImageSize picture, ImageSize data) {
-  // Of the Image's further pixels, and of a Canvas.
+  // Bytes of the Image's further pixels, and of a Canvas.
   return 4 * sizeof(float) * (picture.pixels() - data.pixels()) + sizeof(uint32_t) * picture.pixels();
 }
 

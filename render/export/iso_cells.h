@@ -38,7 +38,7 @@ struct IsoLattice {
   uint64_t number(uint64_t i, uint64_t j, uint64_t k) const { return (j * size[0] + i) * size[2] + k; }
 };
 
-/// `splats` are sorted, of a parallel view whose depth origin is 0. Of one value.
+/// `splats` are sorted, have one value, and are seen in a parallel view whose depth origin is 0.
 IsoCells isoCells(const IsoSplats& splats, size_t tile, const IsoLattice& lattice);
 /// The most memory that it takes.
 uint64_t isoCellsBytes(const IsoSplats& splats, size_t tile, const IsoLattice& lattice);

@@ -60,8 +60,8 @@ class FrameRenderer {
                Progress* progress = nullptr);
 
   /// Draws one frame as render() does, and finds for each pixel the depth where it has half of its opacity,
-  /// and what lies there. Takes about three times as long: the splats are drawn again, by the processor. Of
-  /// several ranks the first gets the values.
+  /// and what lies there. Takes about three times as long: the splats are drawn again, by the processor. If
+  /// several ranks draw, rank 0 gets the values.
   Image renderWithValues(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                          PixelValues& values, Progress* progress = nullptr);
 

@@ -85,7 +85,8 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t sweep_bytes = std::min(kMinSweepBytes + sweep_share, most_sweep_bytes);
   budget.sweep_splats = sweep_bytes / SweepBuffer::bytes(SweepBuffer::kPageSplats) * SweepBuffer::kPageSplats;
   rest -= sweep_bytes - kMinSweepBytes;
-  // Of a series, the values of three steps are kept for each brick: the step, and the two that it is predicted from.
+  // In a series, values of three steps are kept for each brick: those of the step, and of the two that it is
+  // predicted from.
   budget.kept_bytes = fixed.is_series ? rest * kKeptArrays / (kArraysOfSplats + kKeptArrays) : 0;
   budget.cache_bytes = rest - budget.kept_bytes;
   return budget;

@@ -44,8 +44,9 @@ class GradientPercentiles {
   std::vector<float> magnitudes_;
 };
 
-/// The factor of a splat's extinction: piecewise linear in the magnitude, between those of the percentiles and of the
-/// points. Of equal magnitudes the lowest percentile counts: the share of the volume that is less steep.
+/// The factor of a splat's extinction: piecewise linear in the magnitude, between those of the percentiles
+/// and of the points. Where percentiles have equal magnitudes, the lowest counts: the share of the volume
+/// that is less steep.
 class GradientOpacity {
  public:
   /// `points`: x from 0 to 1, the share of the volume that is less steep; opacities from 0 to 1.

@@ -1,7 +1,7 @@
-// Planes that splats are cut at. Clip planes bound half spaces outside of which nothing is drawn: they
-// become faces of the pieces that they cross, as borders do, so that edges are crisp at every level of
-// detail. Of a piece with faces, its ScreenCut is what they leave along the rays of its pixels; its
-// ScreenDepth is where it lies along them.
+// Planes that splats are cut at. Clip planes bound half spaces outside of which nothing is drawn: they become
+// faces of the pieces that they cross, as borders do, so that edges are crisp at every level of detail. A
+// piece with faces has a ScreenCut, which is what they leave along the rays of its pixels, and a ScreenDepth,
+// which is where it lies along them.
 //
 // A plane is kept in data coordinates, then in float relative to a brick's origin (LocalClipPlanes), then in
 // the frame of a splat (CutFace). Pure or immutable; any thread.

@@ -222,7 +222,7 @@ std::vector<Surface> curveSurfaces(const SurfaceScene& scene, const ScreenView& 
 }
 
 uint64_t curveBytes(const SurfaceScene& scene) {
-  // Of a vertex and of a triangle: in a mesh, and before it is joined; on the screen and in tiles.
+  // Bytes of a vertex and of a triangle: in a mesh, and before it is joined; on the screen and in tiles.
   constexpr uint64_t kVertex = 2 * 28 + 16, kTriangle = 2 * 12 + 8;
   uint64_t bytes = 0;
   for (const Curves& curves : scene.curves) {

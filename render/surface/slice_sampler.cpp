@@ -12,8 +12,8 @@ namespace curvisplat {
 namespace {
 
 constexpr double kFixed = 4294967296.0;  // of the sums
-// How much of a splat's own gradient counts. Of 1, 0.9 and 0.5 this is best on merged levels, whose means are
-// over their cells.
+// How much of a splat's own gradient counts. Among 1, 0.9 and 0.5 this is best on merged levels, whose means
+// are over their cells.
 constexpr double kOwn = 0.9;
 constexpr double kMax = 1e5;           // pixels, or ranges of the scalar a pixel
 constexpr double kMaxRatio = 1000;     // of V to √det S: beyond it a splat is degenerate

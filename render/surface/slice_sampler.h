@@ -1,7 +1,7 @@
 // The scalar on a slice: a plane through the data, sampled at the pixels' centres.
 //
-// Of the splats near a point p, with w = V K(|A⁻¹(p - μ)|) / √det S, d = p - μ and the gradient g = A⁻ᵀ slope, the
-// scalar there is
+// The splats near a point p give it a scalar. With w = V K(|A⁻¹(p - μ)|) / √det S, d = p - μ and the gradient
+// g = A⁻ᵀ slope, it is
 //
 //     f(p) = Σ w (f + d · (0.9 g + 0.1 G)) / Σ w        G = Σ w g / Σ w
 //

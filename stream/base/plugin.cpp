@@ -17,7 +17,7 @@ fs::path thisFile() {
   std::error_code error;
   if (::dladdr(reinterpret_cast<const void*>(&openPlugin), &info) == 0 || !info.dli_fname) return {};
   const fs::path program = os::programFile();
-  // Of a program, dladdr() gives the name that it was called by.
+  // For a program dladdr() gives the name that it was called by.
   const fs::path file = fs::canonical(info.dli_fname, error);
   return file.extension() == ".so" || program.empty() ? file : program;
 }

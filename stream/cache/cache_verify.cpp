@@ -168,7 +168,7 @@ class Verifier {
     const auto differs = [](double found, double recorded) {
       return std::abs(found - recorded) > kRounding * std::abs(recorded);
     };
-    // Of earlier caches the reader gives a bound.
+    // The reader gives a bound for earlier caches.
     const bool slope_differs = reader_.manifest().hasEarlierSlopes()
                                    ? slope > (1 + kRounding) * record.largest_slope ||
                                          record.largest_slope > (1 + kRounding) * kEarlierSlopes * slope

@@ -63,8 +63,8 @@ class PartialFolder {
   /// The final name of the folder.
   const std::filesystem::path& target() const { return target_; }
 
-  /// Removes the folder's contents, and undoes leave(). Of an old cache that a killed run has replaced, what
-  /// foreignNames() finds is moved into the new one.
+  /// Removes the folder's contents, and undoes leave(). If a killed run has replaced an old cache, what
+  /// foreignNames() finds in the old one is moved into the new one.
   void clear();
   /// Sets whether the destructor leaves the folder for a later conversion to continue.
   void leave(bool leave = true) { leave_ = leave; }

@@ -262,7 +262,7 @@ std::vector<float> HistogramSums::percentilesOf(const Range& range) const {
     while (percentiles.size() < kPercentiles) {
       const double wanted = static_cast<double>(percentiles.size()) / kPercentiles * total;
       if (!(here > 0 && below + here >= wanted)) break;
-      // Of a bin of one value that is it, not the next float: of 0 that would be 1.4e-45.
+      // A bin of one value has that value, not the next float, which after 0 would be 1.4e-45.
       const bool is_one = std::nextafter(static_cast<float>(lower), kLargest) >= static_cast<float>(upper);
       percentiles.push_back(
           static_cast<float>(is_one ? lower : std::lerp(lower, upper, (wanted - below) / here)));
@@ -270,7 +270,7 @@ std::vector<float> HistogramSums::percentilesOf(const Range& range) const {
     below += here;
   }
   percentiles.resize(kPercentiles + 1, static_cast<float>(range.upper));
-  // Of splats' means that rounding took beyond the ends of the samples' range, and of an edge in double precision.
+  // Rounding may take splats' means, and an edge in double precision, beyond the ends of the samples' range.
   for (size_t n = 1; n <= kPercentiles; ++n)
     percentiles[n] = std::clamp(percentiles[n], percentiles[n - 1], static_cast<float>(range.upper));
   return percentiles;

@@ -1,11 +1,11 @@
 // Decoded bricks of one variable, or two, that outlive a frame, in an arena of fixed size.
 //
-// Invariant: every brick is charged the bytes of its 17 arrays, or 22 with a second variable; the charges
-// and the holes make up the capacity; a pinned brick is never evicted. Of the others the least recently used
-// is evicted first, but none that was used in the current epoch (a frame, or a prefetch). If a frame needs
-// more bricks than the cache holds, plain least recently used would evict each brick shortly before the next
-// frame needs it, and nothing would ever be found. Here the frame's first bricks stay, and its last ones are
-// not kept.
+// Invariant: every brick is charged the bytes of its 17 arrays, or 22 with a second variable; the charges and
+// the holes make up the capacity; a pinned brick is never evicted. The least recently used of the others is
+// evicted first, but none that was used in the current epoch (a frame, or a prefetch). If a frame needs more
+// bricks than the cache holds, plain least recently used would evict each brick shortly before the next frame
+// needs it, and nothing would ever be found. Here the frame's first bricks stay, and its last ones are not
+// kept.
 //
 // Bricks are kept decoded, not packed: decoding takes two thirds of preparing a brick, and a disk delivers
 // packed bricks faster than all cores decode them. bench/README.md has the figures.

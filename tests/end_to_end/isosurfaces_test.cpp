@@ -85,7 +85,8 @@ TEST_F(Isosurfaces, CrossingsHaveTheirOpacityAndTheirLight) {
   const KnownFunction function = KnownFunction::of("smooth");
   const glm::dvec3 colour = function.table.at(kValue).colour;
   const OpticalFunction nothing = [](double) { return OpticalProperties{}; };
-  // By each splat's own crossings and normals the first row was at 36.4 dB, with four rays at outlines at 40. Of what is left most is at outlines.
+  // By each splat's own crossings and normals the first row was at 36.4 dB, with four rays at outlines at 40.
+  // Most of what is left is at outlines.
   const struct {
     double opacity;
     bool volume;

@@ -1,6 +1,6 @@
 // Conversion, and the addition of a scalar and of a time step, on a disk that fails at every call they make:
 // they say so in a line, or have done their work. What is there afterwards is whole or no cache, and nothing
-// else is left. Of structured grids, and of an unstructured one of mixed cells; that one also with so little
+// else is left. The grids are structured ones, and an unstructured one of mixed cells, also with so little
 // memory that positions, sums and faces wait on disk in files without a name.
 #include <fcntl.h>
 #include <fmt/format.h>

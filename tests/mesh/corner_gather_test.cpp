@@ -69,7 +69,8 @@ TEST(CornerGather, GivesFewPolyhedraAtATime) {
 TEST(CornerGather, LeavesRoomForChunksOfPolyhedra) {
   const ArrayMesh mesh({prisms(8000, 40)});
   const MeshReader reader(mesh, {0}, std::nullopt);
-  // Of each prism: 40 points of 8 bytes; 22 faces, the number of whose corners and 120 places take 4 bytes each.
+  // Each prism has 40 points of 8 bytes and 22 faces, the number of whose corners and 120 places take 4 bytes
+  // each.
   const uint64_t prism = 40 * 8 + (22 + 120) * 4, tetrahedron = 4 * 8, cell = 1 + 2 * 8;
   const uint64_t chunk = reader.largestChunk();
   EXPECT_NEAR(static_cast<double>(chunk), 8000 * (prism + tetrahedron + 2 * cell),

@@ -225,7 +225,7 @@ TEST_F(MeshConvert, WeightsSumToTheVolume) {
 }
 
 TEST_F(MeshConvert, LinearFieldsAreExact) {
-  // Of every shape: the mean at the splat's middle, and the slope, are the field's.
+  // Every shape has the field's mean at the splat's middle, and its slope.
   for (const ArrayPiece& piece : {mixedCube(6), tetrahedra_}) {
     ArrayPiece linear = piece;
     const glm::dvec3 gradient(1, -2, 0.5);

@@ -102,8 +102,8 @@ double rippleAtJoint(const Image& image) {
 }
 
 TEST_F(OversetFidelity, JointsOfOwnersAreFaintInAUniformMedium) {
-  // Of half cells at the end of a block (the first four), or of whole ones, a part is left, which is cut where it
-  // ends. Without a cut of half cells: 7.4 to 8.6 %.
+  // A part of half cells at the end of a block (the first four), or of whole ones, is left, and is cut where
+  // it ends. Without a cut of half cells: 7.4 to 8.6 %.
   const std::map<double, double> most{{0.1, 0.025}, {0.2, 0.055}, {0.3, 0.055}, {0.4, 0.08},
                                       {0.7, 0.03},  {1.0, 0.015}, {1.3, 0.055}};
   for (const auto& [overlap, ripple] : most) {

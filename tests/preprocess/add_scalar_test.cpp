@@ -223,7 +223,7 @@ TEST(AddScalar, CutsOctantsInCachesThatHaveThemOnly) {
   const Files files = allFilesOf(cache);
   EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
 
-  // Of a cache without the feature, whole pieces are expected: they lie elsewhere.
+  // A cache without the feature is expected to have whole pieces, which lie elsewhere.
   convertTo(folder / "older.splats", source, {0});
   changeManifest(folder / "older.splats", [](nlohmann::ordered_json& json) {
     std::erase(json["requires"].get_ref<nlohmann::ordered_json::array_t&>(), kCellOctants);
@@ -250,7 +250,7 @@ TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
   const Files files = allFilesOf(cache);
   EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
 
-  // Of a cache from before, splats as they were then are expected.
+  // An older cache is expected to have splats as they were then.
   convertTo(folder / "older.splats", source, {0});
   changeManifest(folder / "older.splats", [](nlohmann::ordered_json& json) { json.erase("stretch"); });
   expectSays(refusal(source, adding(folder / "older.splats", {1})), "another position");
@@ -303,7 +303,7 @@ TEST(AddScalar, SaysWhichValuesAreLeftOut) {
 }
 
 TEST(AddScalar, RefusesBlanksThatTheCacheLeavesAmbiguous) {
-  // Of nodes that coincide, the older scalar blanked some: were the others merged, or blanked too?
+  // The older scalar blanked some of the nodes that coincide: were the others merged, or blanked too?
   const TemporaryFolder folder;
   const GridBlock block = gridBlock(33, 20, 10);
   const FunctionGridSource source({block}, 2, [=](const GridNode& node) {

@@ -58,8 +58,8 @@ TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
   EXPECT_EQ(report.splats, report.nodes);
   EXPECT_EQ(report.merged_nodes, 0u);
   EXPECT_EQ(report.blanked.total(), 0u);
-  // Of the mapping: chords cut off (dθ)²/6 of an annulus.
-  // The rounding of volumes that are alike in whole layers of cells leaves 1.7e-5, and 3.5e-5 if bricks do not make up for it.
+  // The mapping's chords cut off (dθ)²/6 of an annulus. The rounding of volumes that are alike in whole
+  // layers of cells leaves 1.7e-5, and 3.5e-5 if bricks do not make up for it.
   EXPECT_NEAR(report.volume / makeScene("half-annulus")->volume(), 1 - std::pow(M_PI / 32, 2) / 6, 2e-5);
   const CacheReader cache(folder / "c.splats");
   EXPECT_TRUE(cache.manifest().cells);

@@ -57,7 +57,8 @@ TEST_P(NetcdfDamage, FilesWithAWrongByteAreRefusedOrRead) {
 }
 
 TEST(ClassicNetcdfDamage, NamesThatAreTooLongAreRefused) {
-  // Of NetCDF's first version: no records, and one dimension with a name of 300 bytes and a length of 4.
+  // A header of NetCDF's first version: no records, and one dimension with a name of 300 bytes and a length
+  // of 4.
   std::string header("CDF\1\0\0\0\0\0\0\0\x0a\0\0\0\1\0\0\x01\x2c", 20);
   header += std::string(300, 'n') + std::string("\0\0\0\4", 4) + std::string(16, '\0');
   const TemporaryFolder folder;

@@ -253,7 +253,7 @@ TEST(NodeSplats, WithoutNeighboursHaveNoVolumeButAreThere) {
 }
 
 TEST(NodeSplats, DoNotDependOnTheWindow) {
-  // Of uneven cells, so that each is stretched by its neighbours.
+  // Cells are uneven, so that each is stretched by its neighbours.
   const auto uneven = [](double n) { return n + 0.2 * std::sin(2 * n); };
   MappedBlock grid(8, 13, 14, [&](double i, double j, double k) {
     return halfAnnulus(uneven(i) / 8, uneven(j) / 13, uneven(k) / 14);

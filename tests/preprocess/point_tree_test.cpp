@@ -97,7 +97,7 @@ TEST(BoxTree, HoldsWhatBothOfItsBoxesHold) {
   EXPECT_TRUE(holds({0, 0.1, 0.5}));
   EXPECT_FALSE(holds({0.5, 0.1, 0.5}));  // in the axis-parallel box
   EXPECT_FALSE(holds({0, 0.1, 1.5}));
-  // Of more nodes than the corners.
+  // Give it more nodes than the corners.
   turned.slanted = SlantedBox(corner, [&](const auto& visit) {
     for (const glm::dvec3& node : corner) visit(node);
     visit({0.5, 0.05, 0.5});

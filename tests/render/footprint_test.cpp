@@ -90,7 +90,7 @@ TEST(FootprintSkew, KeepsItsNumbers) {
   for (size_t n = 0; n < 4; ++n) EXPECT_NEAR(kept.t[n], skew.t[n], 0.005) << n;
   EXPECT_EQ(FootprintSkew{}.pack(), 0u);
   EXPECT_NEAR(FootprintSkew::unpack(FootprintSkew{{99, -99, 0, 0}}.pack()).t[1], -1.27, 1e-6);
-  // Of cameras that are beyond single precision. The undefined-behaviour sanitizer looks, too.
+  // Cameras beyond single precision give such values. The undefined-behaviour sanitizer looks, too.
   EXPECT_EQ((FootprintSkew{{NAN, -NAN, NAN, 0.5f}}.pack()), (FootprintSkew{{0, 0, 0, 0.5f}}.pack()));
   const float infinite = std::numeric_limits<float>::infinity();
   EXPECT_EQ((FootprintSkew{{infinite, -infinite, 0, 0}}.pack()), (FootprintSkew{{99, -99, 0, 0}}.pack()));
@@ -293,7 +293,7 @@ TEST(GradientOpacity, IsLinearOverTheShareOfTheVolumeThatIsLessSteep) {
   }
   EXPECT_EQ(opacity.of(1e9f), 0);
   EXPECT_EQ(opacity.of(-1), 0.25f);
-  // Of equal magnitudes the lowest share counts.
+  // Where magnitudes are equal, the lowest share counts.
   const GradientPercentiles flat({2, 0, 0, 0, 0, 0, 0, 1}, std::vector<float>(8, 1.0f));
   const GradientOpacity of_flat(std::vector<OpacityPoint>{{0, 0}, {0.2, 1}, {1, 1}}, flat);
   EXPECT_EQ(of_flat.of(0), 0);

@@ -78,7 +78,7 @@ TEST_F(DurableFile, AFailedReplacementKeepsTheOldFile) {
         calls.*fault = at;
         const std::string error = failure(calls);
         if (error.empty()) break;
-        // Of the file that the user has named.
+        // The message names the user's file.
         EXPECT_TRUE(error.starts_with(path.string() + ": ") ||
                     error.starts_with(folder.path().string() + ": "))
             << error;
@@ -128,7 +128,7 @@ TEST_F(DurableFile, LeftoversOfAKilledRunAreRemoved) {
   left = fs::directory_iterator(folder.path())->path();
 
   const TemporaryFile alive(path);
-  // Of another machine, where it may be alive; a link; a folder.
+  // Not removed are a file of another machine, where the process may be alive, a link, and a folder.
   std::string name = left.filename().string();
   name.replace(12, 8, "00000000");
   writeFileAtomically(folder / name, std::string("of another machine"));
@@ -162,7 +162,7 @@ TEST(RoomNeeded, NamesTheLongestGivenFolderThatHoldsTheFile) {
   EXPECT_EQ(messageOf(room, "/d/./tmp/../a/var.1.bin.part"), "/d/a" + rest);
   EXPECT_EQ(messageOf({{"."}, "the cache", "buy a disk"}, "a.partial/geometry.bin"),
             fs::current_path().string() + rest);
-  // Of a folder that the user did not give, the error says what it can.
+  // If the user did not give a folder, the error says what it can.
   EXPECT_EQ(messageOf(room, "/e/file"),
             "/e/file: no room for a byte: No space left on device; make room there");
 }

@@ -13,6 +13,9 @@ sentence ends at a full stop, a colon or a semicolon, and is a fragment if it be
   declaration's), a label (out:), a file's (manifest.json) or one of PROGRAMS
 
 Comments within functions, tables and comments that end a line of code are not looked at. C++ is read as clang-format leaves it.
+
+No sentence of any comment on lines of its own begins with "Of", also within functions: the subject of "Of a series, three steps
+are kept" comes late or never. "In a series three steps are kept" is read once. Shaders in raw strings are not looked at.
 """
 import pathlib
 import re
@@ -26,6 +29,8 @@ FRAGMENTS = set("Across After Against Along Also And Around As At Because Before
                 "Where Which While Whose With Within Without".split())
 PROGRAMS = set("clang false ffmpeg gcc glibc libcgns libjpeg llvmpipe nullopt nullptr true xdotool zlib zstd".split())
 
+RAW = re.compile(r'R"([^\s()\\]*)\(.*?\)\1"', re.S)
+INVERTED = re.compile(r"(?:^|(?<=[.:;]\s))Of\s[^.:;]*[.:;]?")
 COMMENT = re.compile(r"\s*///?(?:\s(.*))?$")
 NAME = re.compile(r"`|\w[\w.]*[_A-Z0-9(\[]|\w+(?::|\.\w)|.(?!\w)")
 TABLE = re.compile(r"\S+(?:  | \|)")
@@ -58,10 +63,8 @@ def begin_declarations(code):
     return found
 
 
-def first_sentences(source):
-    """(line, first sentence, line of code that follows) of each documenting comment."""
-    lines = source.split("\n")
-    declares = begin_declarations(without_text(source))
+def comments(lines):
+    """(first line, line after it, text) of each comment on lines of its own, from 0."""
     begin = 0
     while begin < len(lines):
         end = begin
@@ -69,10 +72,26 @@ def first_sentences(source):
             end += 1
         # A comment that ends a line of code goes on below itself.
         goes_on = begin > 0 and lines[begin - 1].find("//") == lines[begin].find("//") > 0
-        if end > begin and declares[begin] and not goes_on:
-            text = " ".join(COMMENT.match(line)[1] or "" for line in lines[begin:end]).strip()
-            yield begin + 1, re.split(r"(?<=[.:;])\s", text)[0], lines[end] if end < len(lines) else ""
+        if end > begin and not goes_on:
+            yield begin, end, " ".join(COMMENT.match(line)[1] or "" for line in lines[begin:end]).strip()
         begin = max(end, begin + 1)
+
+
+def first_sentences(source):
+    """(line, first sentence, line of code that follows) of each documenting comment."""
+    lines = source.split("\n")
+    declares = begin_declarations(without_text(source))
+    for begin, end, text in comments(lines):
+        if declares[begin]:
+            yield begin + 1, re.split(r"(?<=[.:;])\s", text)[0], lines[end] if end < len(lines) else ""
+
+
+def inverted_sentences(source):
+    """(line of the comment, sentence) of each sentence that begins with "Of", in comments of C++."""
+    without_shaders = RAW.sub(lambda match: "\n" * match[0].count("\n"), source)
+    for begin, _, text in comments(without_shaders.split("\n")):
+        for match in INVERTED.finditer(text):
+            yield begin + 1, match[0]
 
 
 def main():
@@ -82,11 +101,15 @@ def main():
         for path in sorted((root / top).rglob("*")):
             if path.suffix not in (".h", ".cpp"):
                 continue
-            for line, sentence, declaration in first_sentences(path.read_text()):
+            source, name = path.read_text(), path.relative_to(root).as_posix()
+            for line, sentence, declaration in first_sentences(source):
                 checked += 1
                 if is_fragment(sentence, declaration):
                     faults += 1
-                    print(f'{path.relative_to(root).as_posix()}:{line}: "{sentence}" is a fragment; name its subject')
+                    print(f'{name}:{line}: "{sentence}" is a fragment; name its subject')
+            for line, sentence in inverted_sentences(source):
+                faults += 1
+                print(f'{name}:{line}: "{sentence}" begins with "Of"; begin with its subject')
     if checked == 0:
         print(f"{root}: there are no sources")
         return 1

@@ -39,6 +39,14 @@ class Checks(unittest.TestCase):
         self.assertEqual(self.fragments("int a;  // the first,\n        // of two\nint b;  // of the two\n"), [])
         self.assertEqual(self.fragments("// half   a pipe\nint a;\n"), [])
 
+    def test_sentences_that_begin_with_of(self):
+        inverted = lambda source: list(check_comments.inverted_sentences(source))
+        self.assertEqual(inverted("int f() {\n  // Of higher order.\n  return 1;\n}\n"), [(2, "Of higher order.")])
+        self.assertEqual(inverted("// Chooses cells.\n//\n// Any thread. Of these,\n// some are drawn: red.\n"),
+                         [(1, "Of these, some are drawn:")])
+        self.assertEqual(inverted("// Chooses cells\n// Of a kind. Offsets follow.\nint a;  // Of it.\n"), [])
+        self.assertEqual(inverted('const char* kShader = R"glsl(\n// Of pixels.\n)glsl";\n// Of it.\n'), [(4, "Of it.")])
+
     def test_scopes(self):
         inner = "  /// Of it.\n  int a;\n"
         for head in ("namespace n {", "class A final : public B {", "struct alignas(64) A {", "template <typename T>\nstruct A {"):

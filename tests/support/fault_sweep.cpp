@@ -13,7 +13,7 @@
 namespace curvisplat::faults {
 namespace {
 
-/// Whether the line gives the system's reason. Of a file that is cut off there are many things to say.
+/// Whether the line gives the system's reason. There are many things to say about a file that is cut off.
 bool tellsWhy(const std::string& line, const Fault& fault) {
   return fault.error == 0 || line.find(std::strerror(fault.error)) != std::string::npos;
 }

@@ -11,8 +11,8 @@
 
 namespace curvisplat {
 
-/// Prints the number of steps, and of a series a line for each: its time, its date if the unit has one, its geometry, and the ranges of its
-/// scalars. Of more than 24 steps the middle ones are left out.
+/// Prints the number of steps, and for a series a line for each: its time, its date if the unit has one, its
+/// geometry, and the ranges of its scalars. If there are more than 24, the middle ones are left out.
 void printSteps(const CacheReader& reader);
 
 /// [step]: time, geometry, and for each scalar its range and bytes.

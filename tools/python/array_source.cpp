@@ -77,7 +77,8 @@ class ArrayView {
  private:
   enum class Kind { kFloat, kDouble, kBool };
 
-  /// Elements may lie at any address. Of bool, every byte but 0 is true: views of other arrays have all of them.
+  /// Elements may lie at any address. As a bool every byte but 0 is true: views of other arrays have all of
+  /// them.
   template <typename Stored, typename T>
   void copyElements(const std::byte* first, uint64_t count, T* out) const {
     for (uint64_t n = 0; n < count; ++n) {

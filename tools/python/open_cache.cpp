@@ -218,7 +218,7 @@ OpenCache::Use OpenCache::use() {
 
 FrameRenderer& OpenCache::rendererOf(const DrawnScalars& scalars, Backend backend) {
   const size_t variable = scalars.opacity.variable;
-  // Of two scalars, the colours' function cannot be replaced.
+  // In a picture of two scalars the colours' function cannot be replaced.
   if (player_ && !scalars.colour && !two_scalars_ && variable == variable_ && backend == backend_) {
     player_->setTransferFunction(scalars.opacity.function);
     return player_->renderer();

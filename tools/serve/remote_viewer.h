@@ -5,10 +5,10 @@
 //       +--------send()----------+        +----------- wake ------------+
 //                 encoded
 //
-// Of each kind of request only the newest is kept, so that no page can make this grow. While the camera
-// moves, the next picture is asked for as soon as fewer than three are on their way to the page: neither the
-// drawing nor the line gets ahead of what the page shows. At rest, pictures become finer, and the last one
-// is lossless: the same as `curvisplat render` writes.
+// Only the newest request of each kind is kept, so that no page can make this grow. While the camera moves,
+// the next picture is asked for as soon as fewer than three are on their way to the page: neither the drawing
+// nor the line gets ahead of what the page shows. At rest, pictures become finer, and the last one is
+// lossless: the same as `curvisplat render` writes.
 #pragma once
 
 #include <cstddef>

@@ -288,7 +288,8 @@ void FrameLoop::preparePlayer(Drawing& drawing, const FrameRequest& request) {
   std::vector<size_t> variables{scalars.opacity.variable};
   if (scalars.colour) variables.push_back(scalars.colour->variable);
   const bool same_function = drawing.function_version == request.function_version;
-  // Of two scalars, the renderer can change neither the colours nor which of the functions changed.
+  // In a picture of two scalars the renderer can change neither the colours nor which of the functions
+  // changed.
   if (!drawing.player || drawing.variables != variables || (scalars.colour && !same_function)) {
     drawing.player.reset();  // frees its memory before the next one allocates
     if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);

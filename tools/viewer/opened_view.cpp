@@ -204,7 +204,7 @@ void OpenedView::takeWhole() {
     if (is_kept) options.grid_files = opening_files_;
     const auto preview = view_ ? view_->preview() : std::nullopt;
     const bool follows_preview = preview && preview->whole == cache;
-    // Of one that is opened again, too, what the user has changed while it opened.
+    // What the user changed in a preview is kept, and so it is where an open cache is opened again.
     if (follows_preview || (view_ && view_->isOf(preparation->prepared->cache)))
       options.carried = view_->carriedTo(*preparation->prepared);
     if (options.carried) options.scalar.reset();  // the user has chosen since

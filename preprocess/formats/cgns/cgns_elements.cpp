@@ -72,7 +72,7 @@ CgnsIntegers storedIntegers(const CgnsFile& file, const CgnsNode& node) {
       throw Error("{}: {} has {} values; expected at least {}; the file is damaged", file.path().string(),
                   node.path, all, first + to.size());
     std::vector<double> values(to.size());
-    // Of a table: column by column.
+    // A table is read column by column.
     const uint64_t rows = shape.dims[0];
     for (uint64_t done = 0; done < to.size();) {
       const uint64_t row = (first + done) % rows, column = (first + done) / rows;

@@ -230,7 +230,7 @@ void ExodusSource::appendCells(uint32_t, uint64_t first, uint64_t count, MeshCel
   std::vector<uint64_t> points;
   forEachPartOfLists(blocks_, first, count, elementsOf, [&](const PartOfList& part) {
     const Block& block = blocks_[part.list];
-    // Of elements that are left out nothing is read: they may have any number of nodes.
+    // Elements that are left out are not read: they may have any number of nodes.
     const uint64_t nodes_each = block.kind == CellKind::kNone ? 0 : block.nodes_each;
     stored.resize(part.count * nodes_each);
     if (!stored.empty())

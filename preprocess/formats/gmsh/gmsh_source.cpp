@@ -55,7 +55,7 @@ constexpr Element kElements[] = {
     {17, 20, CellKind::kHexahedron, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}},
     {18, 15, CellKind::kWedge, {0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11}},
     {19, 13, CellKind::kPyramid, {0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12}},
-    // Of higher order.
+    // Cells of orders above 2, which are drawn by their corners.
     {29, 20, CellKind::kTetrahedron},
     {30, 35, CellKind::kTetrahedron},
     {31, 56, CellKind::kTetrahedron},

@@ -22,10 +22,11 @@ namespace curvisplat {
 
 class NetcdfFiles {
  public:
-  /// Dimensions of the same name and length are one dimension, and so are ICON's cells by either name. If several files have a variable of the same
-  /// name, the first file's is taken and warnings() lists the others; but each file keeps its times since
-  /// a date. Of the options, the files and `select` count. Throws Error as NetcdfFile does, and for a file that
-  /// is not NetCDF; UsageError for a selection of what is not there.
+  /// Dimensions of the same name and length are one dimension, and so are ICON's cells by either name. If
+  /// several files have a variable of the same name, the first file's is taken and warnings() lists the
+  /// others; but each file keeps its times since a date. Only the files and `select` of the options matter.
+  /// Throws Error as NetcdfFile does, and for a file that is not NetCDF; UsageError for a selection of what
+  /// is not there.
   explicit NetcdfFiles(const OpenGridOptions& options);
 
   /// The path of the first file.

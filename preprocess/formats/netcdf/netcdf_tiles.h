@@ -1,9 +1,9 @@
 // A NetCDF file whose map several processors have written, each a part to a file of its own, as NEMO and XIOS
 // do: NAME_0000.nc, NAME_0001.nc, ... with the attributes DOMAIN_*. NetcdfTiles reads the parts as one file.
-// What no part has is missing (NEMO leaves out processors of land alone); of what several have, halos, that of
-// the part which owns it is read. Any other file is a single part.
+// What no part has is missing (NEMO leaves out processors of land alone); what several parts have, a halo, is
+// read from the part that owns it. Any other file is a single part.
 //
-// Any number of threads may read. Of many parts, one at a time is open.
+// Any number of threads may read. If there are many parts, one at a time is open.
 #pragma once
 
 #include <array>

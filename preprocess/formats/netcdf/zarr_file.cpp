@@ -291,7 +291,7 @@ std::shared_ptr<const ZarrFile::Bytes> ZarrFile::chunkAt(size_t number,
     cache.chunks.splice(cache.chunks.begin(), cache.chunks, found);
     return found->bytes;
   }
-  // Of values of variable length, what it may take.
+  // A chunk of values of variable length counts as the most that it may take.
   const ZarrArray& array = arrays_[number];
   const size_t bytes = array.value_bytes == 0 ? kMaxTextBytes : array.chunkBytes();
   while (!cache.chunks.empty() && cache.bytes + bytes > kCacheBytes) {

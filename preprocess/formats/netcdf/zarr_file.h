@@ -1,9 +1,9 @@
 // A Zarr store as a NetCDF file: its arrays are the variables, and their attributes those of the CF conventions, as
 // xarray, libnetcdf and other programs write them.
 //
-// Of each array that is read it keeps chunks of 2 MiB, or one chunk where that is larger; a read decompresses the chunks
-// that overlap the box, one at a time. A chunk that was not written has the fill value. Any number of threads may use it; their
-// reads run one after the other.
+// It keeps 2 MiB of decompressed chunks for each array that is read, or one chunk where that is larger; a
+// read decompresses the chunks that overlap the box, one at a time. A chunk that was not written has the fill
+// value. Any number of threads may use it; their reads run one after the other.
 #pragma once
 
 #include <cstddef>

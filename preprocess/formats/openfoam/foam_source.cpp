@@ -220,7 +220,7 @@ void FoamSource::listFacesOfCells(Piece& piece, const FoamList& owner, const Foa
   for (const FoamList* list : {&owner, &neighbour})
     forEachLabel(*list, [&](uint64_t first, const std::vector<uint64_t>& values) {
       for (size_t n = 0; n < values.size(); ++n) {
-        // Of a boundary face some versions say -1, in 32 or in 64 bits.
+        // Some versions give a boundary face the neighbour -1, in 32 or in 64 bits.
         if (list == &neighbour && values[n] >= 0xffffffff) continue;
         if (values[n] >= faces)
           throw Error(
