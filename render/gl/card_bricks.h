@@ -1,7 +1,7 @@
 // The bricks that stay on the card, and their projection there (project_shader.h).
 //
-// All lie in one buffer, each in a place of its own: its arrays, then its BrickPieces. Where no place is large enough among
-// those that are free, all bricks are sent again. On the context's thread.
+// Each brick has a range of one buffer: its arrays, then its BrickPieces. If no free range is large enough for a new
+// brick, all bricks are sent again. All calls are on the context's thread.
 #pragma once
 
 #include <array>
@@ -21,20 +21,22 @@ class CardBricks {
  public:
   explicit CardBricks(const GlFunctions& gl);
 
-  /// Compiles what is otherwise compiled when it is first needed. Throws Error where the driver refuses it.
+  /// Compiles the shaders now instead of when they are first needed. Throws Error if the driver refuses them.
   void compile();
-  /// These are BrickStore's.
+  /// The functions of BrickStore (render/project/brick_store.h).
   void open(uint64_t content);
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes);
   bool has(uint32_t brick) const;
   void put(uint32_t brick, const GeometryArrays<const float>& geometry,
            const VariableArrays<const float>& values, const BrickPieces& pieces);
-  /// How many elements project() writes for a part of a stored brick: one for each of its splats, and two for each piece.
+  /// The number of elements that project() writes for a part of a stored brick: one for each splat, and
+  /// kElementsAPiece for each piece.
   size_t elementsOf(const StoredPart& part) const;
-  /// Projects the parts into the first elements of `splats`, drawn or not. `tables` has those of the frame.
+  /// Projects the parts into the first elements of `splats`, whether they are drawn or not. `tables` are the
+  /// frame's.
   void project(const ProjectionSettings& settings, const DepthKeys& keys, std::span<const StoredPart> parts,
                const SplatTables& tables, float largest_scalar, const CardBuffer& splats);
-  /// The counts of the last project(), for which it waits.
+  /// Waits for the last project() and returns its counts.
   ProjectionCounts counts() const;
   uint64_t cardBytes() const { return words_.bytes() + parts_.bytes() + groups_.bytes(); }
 
@@ -49,7 +51,7 @@ class CardBricks {
   };
   struct Stored {
     uint64_t begin = 0, words = 0;
-    uint64_t used = 0;  // the number of the frame that asked for it last
+    uint64_t used = 0;  // number of the frame that last needed it
   };
   /// Splats with pieces: numbers in Known.
   struct PieceRange {
@@ -67,9 +69,9 @@ class CardBricks {
   const GlFunctions& gl_;
   std::array<std::optional<GlProgram>, 2> programs_;  // [perspective]
   CardBuffer words_, parts_, groups_, fates_, frames_;
-  std::map<uint32_t, Known> known_;        // by number
-  std::map<uint32_t, Stored> bricks_;      // by number
-  std::map<uint64_t, uint32_t> by_place_;  // by their begin
+  std::map<uint32_t, Known> known_;        // [number]
+  std::map<uint32_t, Stored> bricks_;      // [number]
+  std::map<uint64_t, uint32_t> by_place_;  // [Stored::begin] number
   bool is_scattered_ = false;              // there was no place for a brick
   uint64_t content_ = 0, frame_ = 0;
 };

@@ -1,4 +1,4 @@
-// Memory on the card, for shaders.
+// A buffer of the card's memory that shaders read and write. All calls are on the context's thread.
 #pragma once
 
 #include <cstdint>
@@ -8,24 +8,25 @@
 
 namespace curvisplat {
 
-/// Memory on the card that grows as it is needed; what was in it is lost then.
+/// A shader storage buffer that grows as needed. Growing loses its contents.
 class CardBuffer {
  public:
   explicit CardBuffer(const GlFunctions& gl) : gl_(gl), object_(makeBuffer(gl)) {}
 
-  /// Throws Error where the card has no such memory, or OpenGL no such buffers.
+  /// Makes the buffer at least this large. Throws Error if the card lacks the memory, or OpenGL the kind of
+  /// buffer.
   void reserve(uint64_t bytes);
-  /// Gives its memory up.
+  /// Frees the memory.
   void release();
-  /// The largest that there can be.
+  /// The largest buffer that OpenGL allows, in bytes.
   static uint64_t largest(const GlFunctions& gl);
-  /// Binds the buffer for shaders, at the binding.
+  /// Binds the buffer at the shaders' binding point `binding`.
   void bind(GLuint binding) const { gl_.BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, object_.name()); }
   /// Binds the buffer for glBufferSubData and the like, at GL_SHADER_STORAGE_BUFFER.
   void bind() const { gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, object_.name()); }
-  /// Sets it all to 0.
+  /// Fills the buffer with zeros.
   void clear() const;
-  /// Writes at the offset in bytes; the buffer has space for it.
+  /// Writes the values from the offset in bytes on; they must fit into the buffer.
   template <typename T>
   void write(uint64_t offset, std::span<const T> values) const {
     writeBytes(offset, values.data(), values.size_bytes());

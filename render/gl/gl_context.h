@@ -19,7 +19,7 @@
 
 namespace curvisplat {
 
-/// Current on the thread that made it, and used and destroyed there only.
+/// A context that is current on the thread that made it, and is used and destroyed there only.
 class GlContext {
  public:
   virtual ~GlContext() = default;
@@ -27,9 +27,10 @@ class GlContext {
   GlContext& operator=(const GlContext&) = delete;
 
   const GlFunctions& functions() const { return functions_; }
-  /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  /// The library, the device and the version, such as "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits),
+  /// OpenGL 4.5".
   const std::string& name() const { return name_; }
-  /// Whether the processor draws: no graphics card does.
+  /// Whether the processor draws, not a graphics card.
   bool isSoftware() const { return software_; }
 
  protected:
@@ -41,29 +42,30 @@ class GlContext {
   bool software_ = true;
 };
 
-/// Mesa keeps compiled shaders in the user's cache folder, in a file that is mapped into memory before the disk has room for it:
-/// on a full disk, or where the user's quota is used up, SIGBUS would end the process. Looks, once, whether there is room, and
-/// where there is none sets the variable that keeps Mesa from it. Call it before the first context is made.
+/// Turns off Mesa's file of compiled shaders if the disk of the user's cache folder is full. Mesa maps that
+/// file into memory before the disk has space for it, so a full disk or an exhausted quota would end the
+/// process with SIGBUS. Checks once, and sets an environment variable. Call it before the first context is
+/// made.
 void keepMesaOffAFullDisk();
 
 /// The libraries that give a context without a window.
 enum class GlLibrary { kOsmesa, kEgl };
 
-/// Makes a core context of OpenGL 3.3 or newer, current on the calling thread. Throws Error that names
-/// what was tried and its error.
+/// Makes a core context of OpenGL 3.3 or newer, current on the calling thread. Throws Error, which names what
+/// was tried and why it failed.
 std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library);
 
-/// Makes a context by EGL, which has OpenGL on a graphics card without a display, and in software where
-/// there is none. Asks every device of the machine, graphics cards before software, then Mesa's surfaceless
-/// platform. Throws Error with the error of each of them.
+/// Makes a context by EGL, on a graphics card without a display, or in software if there is none. Tries every
+/// device of the machine, graphics cards before software, then Mesa's surfaceless platform. Throws Error,
+/// which says why each of them failed.
 std::unique_ptr<GlContext> makeEglContext();
 
-/// Whether EGL knows of a device that is not software, or cannot tell. Much quicker than a context. Throws
-/// Error where there is no EGL.
+/// Whether EGL lists a device that is not software, or cannot list devices. Much quicker than making a
+/// context. Throws Error if there is no EGL.
 bool eglMayHaveCard();
 
-/// Makes a context by OSMesa: OpenGL in software, into memory, without a display or a GPU. Throws Error with
-/// the names tried and the loader's error, or if OSMesa gives no context.
+/// Makes a context by OSMesa, which draws in software, into memory, without a display. Throws Error if the
+/// library is not found (with the names tried and the loader's error) or gives no context.
 std::unique_ptr<GlContext> makeOsMesaContext();
 
 /// The one thread that owns the OpenGL context. All calls of OpenGL run on it, in jobs that the caller waits

@@ -1,9 +1,9 @@
 // OpenGL as C++: the entry points that the program uses, fetched from the context's own getProcAddress, and
 // objects that own OpenGL's names (buffers, textures, programs, fences).
 //
-// No GL library is linked: which one serves is decided when a context is made. Functions are valid as long
-// as the context is. Objects are move-only, and give their name back when they end. Everything is called,
-// made and destroyed on the context's thread.
+// No GL library is linked: the context decides which one is used. Functions are valid as long as the context.
+// Objects are move-only, and delete their name when they are destroyed. Everything is called, made and
+// destroyed on the context's thread.
 #pragma once
 
 #include <GL/glcorearb.h>
@@ -87,7 +87,7 @@ namespace curvisplat {
   X(VertexAttribPointer, PFNGLVERTEXATTRIBPOINTERPROC)         \
   X(Viewport, PFNGLVIEWPORTPROC)
 
-// Null, or refused, where the context is older: see whyNoCompute().
+// These are null, or fail, if the context is older than 4.3: see whyNoCompute().
 #define CURVISPLAT_GL_4_3_FUNCTIONS(X)           \
   X(BindBufferBase, PFNGLBINDBUFFERBASEPROC)     \
   X(BindImageTexture, PFNGLBINDIMAGETEXTUREPROC) \
@@ -115,14 +115,15 @@ struct GlFunctions {
   /// Throws Error naming the first function that `lookup` does not know.
   explicit GlFunctions(const Lookup& lookup);
 
-  /// Empty if compute shaders can be used; else why not. Some libraries have functions that their contexts refuse.
+  /// Says why compute shaders cannot be used; empty if they can. Some libraries have functions that their
+  /// contexts refuse.
   std::string whyNoCompute() const;
 
   /// Throws Error if a call has failed since the last check: "OpenGL failed while <doing>: <error>".
   void check(std::string_view doing) const;
 };
 
-/// Owns a name from glGen...(1, &name), which is given back to glDelete...(1, &name).
+/// Owns a name that glGen...(1, &name) made, and passes it to glDelete...(1, &name) at the end.
 class GlObject {
  public:
   using Generate = void(APIENTRYP)(GLsizei, GLuint*);
@@ -168,7 +169,7 @@ inline GlObject makeQuery(const GlFunctions& gl) {
 /// A linked program: of a vertex and a fragment shader, or of a compute shader.
 class GlProgram {
  public:
-  /// Throws Error with the first line of the compiler's or the linker's words.
+  /// Throws Error with the first line of the compiler's or the linker's message.
   GlProgram(const GlFunctions& gl, std::string_view vertex_source, std::string_view fragment_source);
   GlProgram(const GlFunctions& gl, std::string_view compute_source);
   ~GlProgram();
@@ -176,7 +177,7 @@ class GlProgram {
   GlProgram& operator=(GlProgram&&) = delete;
 
   GLuint name() const { return name_; }
-  /// The location of a uniform that the program has; -1, which GL ignores, of one that was optimised away.
+  /// The location of a uniform of the program; -1, which GL ignores, if it was optimised away.
   GLint uniform(const char* name) const { return gl_->GetUniformLocation(name_, name); }
 
  private:
@@ -204,12 +205,12 @@ class GlFence {
   GLsync sync_;
 };
 
-/// Measures pieces of work by OpenGL's own clock, each of one of a few kinds.
+/// Measures how long OpenGL works, by its own clock, in sums for a few kinds of work.
 class GlTimers {
  public:
   GlTimers(const GlFunctions& gl, size_t kinds) : gl_(gl), seconds_(kinds) {}
 
-  /// run(), which does not measure anything itself.
+  /// Calls run() and measures its commands as work of this kind. run() must not call measure().
   template <typename Run>
   void measure(size_t kind, const Run& run) {
     running_.push_back({kind, makeQuery(gl_)});
@@ -220,10 +221,10 @@ class GlTimers {
     } end{gl_};
     run();
   }
-  /// Waits until all is done that was measured.
+  /// Waits until OpenGL has done all measured work.
   void finish();
   void reset();
-  /// The seconds of what is done, since reset().
+  /// Seconds of this kind of work between reset() and the last finish().
   double seconds(size_t kind) const { return seconds_[kind]; }
 
  private:

@@ -1,8 +1,8 @@
-// Draws screen splats with OpenGL 3.3: an instanced quad a splat, the footprint and the classification as tables
-// in textures, blended over what was drawn before in 32-bit floats.
+// Draws screen splats with OpenGL 3.3. Each splat is an instanced quad, which is blended in 32-bit floats;
+// tables of the footprint and the classification are textures.
 //
-// The image's top row is the framebuffer's first, so that nothing is ever flipped.
-// Lives on the context's thread. Not built for: more than one frame at a time.
+// The image's top row is the framebuffer's first, so that nothing is ever flipped. Used on the context's
+// thread, for one frame at a time.
 #pragma once
 
 #include <memory>
@@ -29,7 +29,7 @@ class GlPainter final : public Painter {
   CardWork cardWork() const override;
   bool isOverfull() const override;
 
-  /// The memory for a frame beside the picture itself.
+  /// Bytes of memory that a frame takes besides the picture itself.
   static uint64_t bytes(ImageSize size, const PaintResources& resources);
 
  private:

@@ -1,9 +1,9 @@
-// Lists of the splats of tiles on the card, each sorted by the splats' keys in the tile, in compute shaders.
+// Makes a list of the splats in each tile on the card, sorted by their keys in the tile, by compute shaders.
 //
 //   count the entries of each tile -> add them up -> write them, where they fall -> sort each tile's
 //
-// What is sorted is a tile's few entries, by the key and, of equal ones, the number of the splat. So the lists are the same
-// from run to run. On the context's thread.
+// A tile's entries are sorted by key, then by the number of the splat, so the lists are the same from run to
+// run. All calls are on the context's thread.
 #pragma once
 
 #include <array>
@@ -16,39 +16,40 @@
 
 namespace curvisplat {
 
-/// The splats to be listed.
+/// The splats to be listed. Keys are those of render/project/tile_key.h.
 struct ListedSplats {
   const CardBuffer* splats;  // ScreenSplats
-  uint32_t count;            // of those, from the first on
-  uint32_t waiting;          // of them, the first: they were listed before, with their keys up to `before`
-  uint32_t before, front;    // keys: those up to `front` are listed
-  bool ordered;              // false: all splats have one order, in which they come
+  uint32_t count;            // how many, from the first on
+  uint32_t waiting;          // the first ones, which were listed before, with keys up to `before`
+  uint32_t before, front;    // keys in a tile up to `front` are listed now
+  bool ordered;              // false: in every tile the order is that of `splats`
 };
 
-/// The picture's tiles of one size, and how many pixels of each take no more.
+/// The picture's tiles of one size, and how many pixels of each are saturated.
 struct CardTiles {
   int side;
   ImageSize picture;
   const CardBuffer* closed;
-  uint32_t closed_begin;  // in it, [tile]
+  uint32_t closed_begin;  // where the picture's tiles begin in `closed`
   int columns() const { return TileSet::tilesAlong(picture.width, side); }
 };
 
 class GlTileLists {
  public:
   static constexpr uint64_t kEntryBytes = 2 * sizeof(uint32_t);
-  /// Kinds of its timers.
+  /// Kinds of work that `timers` measures.
   enum Stage : size_t { kList, kSort, kOtherStages };
 
-  /// `timers`: of at least those stages; outlive the lists.
+  /// `timers` has at least these kinds, and outlives the lists.
   GlTileLists(const GlFunctions& gl, GlTimers& timers);
 
-  /// How many entries the lists of the tiles in `box` have, which are not closed.
+  /// Counts the entries that the lists of the tiles in `box` will have. Closed tiles have none.
   uint64_t count(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box);
-  /// Makes the lists of what was counted last.
+  /// Makes the lists that count() has counted; the arguments and its result must be the same.
   void make(const ListedSplats& splats, const CardTiles& tiles, const TileBox& box, uint64_t entries);
 
-  /// Binds what tileRanges() reads, and at 4 the entries: [entry] the key, and the number of its splat.
+  /// Binds what tileRanges() reads, and at binding 4 the entries: for each the key and the number of its
+  /// splat.
   void bind() const;
   uint64_t cardBytes() const { return ends_.bytes() + chunks_.bytes() + total_.bytes() + entries_.bytes(); }
   /// The entries listed since resetCounts().

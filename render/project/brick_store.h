@@ -1,11 +1,11 @@
-// The interface of a painter's store of bricks: decoded bricks that stay where the painter draws, on a graphics
-// card, and are projected there in every frame.
+// The interface of a painter's store of bricks: decoded bricks that stay on a graphics card from frame to
+// frame, and are projected there.
 //
 //   makeRoom -> put what is missing -> Painter::begin -> drawStored -> draw ... -> end
 //
-// What is drawn from a store is what BrickProjector would give, but for rounding, in the order of the same keys. What a store draws
-// in pieces is divided when it is put there (BrickPieces), which does not depend on the view; any thread may do so. All calls
-// of a store are on the painter's thread.
+// The store makes the splats that BrickProjector would make, except for rounding, with the same keys. Splats at
+// borders are divided into pieces when a brick is put into the store (BrickPieces); this does not depend on the
+// view, and any thread may do it. All calls of a store are on the painter's thread.
 #pragma once
 
 #include <array>
@@ -25,13 +25,13 @@ namespace curvisplat {
 /// A part of a brick to be drawn from a store.
 struct StoredPart {
   uint32_t brick = 0;
-  size_t splats = 0;  // of the brick
+  size_t splats = 0;  // splats of the whole brick
   SplatRanges ranges;
   glm::dvec3 cell_min;
   KeyRange keys;
 };
 
-/// A piece of a splat at a border as a card reads it: ten vectors of four.
+/// A piece of a splat at a border as the card reads it, in ten vectors of four numbers.
 struct StoredPiece {
   static constexpr size_t kMaxFaces = 3;
 
@@ -56,7 +56,8 @@ struct BrickPieces {
   std::vector<StoredPiece> pieces;
   bool has_too_many = false;  // then there are none, and splats at borders are drawn as any other
 
-  /// Divides splats at borders, as BrickProjector does: with more pieces than its kMaxPieces one splat instead of two, then any.
+  /// Divides the splats at borders as BrickProjector does. If there would be more than its kMaxPieces pieces, cells at
+  /// faces are one splat instead of two, and if that does not help, splats at borders are drawn as any other.
   static BrickPieces of(const GeometryArrays<const float>& geometry,
                         const VariableArrays<const float>& values, const BorderStyle& borders);
 };
@@ -65,30 +66,34 @@ class BrickStore {
  public:
   virtual ~BrickStore() = default;
 
-  /// Forgets all bricks, unless `content` is the number that was given last: one for each cache, step and variable.
+  /// Removes all bricks if `content` differs from the number given last. Each cache, step and variable has a
+  /// number of its own.
   virtual void open(uint64_t content) = 0;
-  /// Makes room in `bytes` of the card's memory for the bricks of parts, and for what they are drawn as. Returns how many of
-  /// the first parts fit as far as it knows, since only a brick that was put tells how many pieces it has. Where all of those
-  /// are stored, this depends on nothing else. Throws Error where the card refuses that memory.
+  /// Reserves space in `bytes` of the card's memory for the bricks of the parts and for their projected
+  /// splats. Returns how many parts, from the first on, fit as far as the store knows: only a brick that was
+  /// put there tells how many pieces it has. If all of those parts are stored, the number depends on the
+  /// arguments alone. Throws Error if the card refuses the memory.
   virtual size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) = 0;
-  /// The default of `bytes`: a share of what the card has free; 0 where the processor draws.
+  /// The default for `bytes` of makeRoom(): a share of the card's free memory; 0 if OpenGL draws on the
+  /// processor.
   virtual uint64_t defaultBytes() const = 0;
   virtual bool has(uint32_t brick) const = 0;
-  /// Adds a brick; others that the last makeRoom() was not asked for may go. If there is no place for it all the same, has() says
-  /// so, and there is one after the next makeRoom(), which empties the store.
+  /// Adds a brick. Bricks that no part of the last makeRoom() needs may be evicted for it. If there is no free
+  /// range for it all the same, has() remains false, and the next makeRoom() empties the store.
   virtual void put(uint32_t brick, const GeometryArrays<const float>& geometry,
                    const VariableArrays<const float>& values, const BrickPieces& pieces) = 0;
-  /// Whether pictures with these settings can be drawn from a store: those without layers and without opacities by the
-  /// gradient.
+  /// Whether pictures with these settings can be drawn from a store. Those with layers or gradient opacity
+  /// cannot.
   static bool canDraw(const ProjectionSettings& settings);
-  /// Whether a brick can, in such a picture: neither clip planes nor perspective cut its splats.
-  /// `cell_min`: the corner that its splats' positions count from.
+  /// Whether the brick can be drawn from a store in such a picture: neither clip planes nor perspective may
+  /// cut its splats. Positions of its splats are relative to `cell_min`.
   static bool canDraw(const Brick& brick, const glm::dvec3& cell_min, const ProjectionSettings& settings);
 
-  /// Projects the parts, all of which are stored. Between begin() and the first draw() of the painter.
+  /// Projects the parts, all of which are stored. Call it between begin() and the first draw() of the
+  /// painter.
   virtual void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
                           std::span<const StoredPart> parts) = 0;
-  /// Counts of the splats of drawStored(); complete after end().
+  /// Counts of the splats that drawStored() projected; complete after the painter's end().
   virtual ProjectionCounts counts() const = 0;
 };
 

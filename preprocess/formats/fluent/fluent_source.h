@@ -18,12 +18,13 @@
 
 namespace curvisplat {
 
-/// Whether it is a case or its data. Throws Error for HDF5 that is truncated.
+/// Whether the file is a Fluent case or its data. Throws Error if it is truncated HDF5.
 bool isFluentHdf5(const InputFile& file);
 
-/// Reads a case and the data file after it, or else the one beside it whose name is the case's. Spools where each face
-/// begins, and the faces of each cell; the rest is read by position. Scalars are SV_P, SV_U, ..., of further phases
-/// phase-2:SV_VOF. Throws Error if a file is missing or damaged.
+/// Reads a case, with the data file that is named after it, or else the one of the same name beside it.
+/// Spools where each face begins, and the faces of each cell; the rest is read by position. Scalars are
+/// called SV_P, SV_U and so on, those of further phases phase-2:SV_VOF. Throws Error if a file is missing or
+/// damaged.
 std::unique_ptr<DataSource> openFluent(const OpenGridOptions& options);
 
 }  // namespace curvisplat

@@ -22,7 +22,8 @@
 
 namespace curvisplat {
 
-/// The words of a file, and its numbers, which are text or binary.
+/// Reads the file from its beginning. Text and binary numbers alternate: lines are always text, next() reads
+/// what setBinary() chose.
 class GmshReader {
  public:
   explicit GmshReader(std::shared_ptr<const PooledFile> file)
@@ -41,7 +42,7 @@ class GmshReader {
   bool isBinary() const { return binary_; }
   uint64_t offset() const { return bytes_at_ > 0 ? bytes_at_ : text_.offset(); }
 
-  /// The next line that is not empty; nullopt at the end.
+  /// The next line that is not empty; nullopt at the end of the file.
   std::optional<std::string> line() {
     leaveBytes();
     while (const auto line = text_.line())
@@ -53,12 +54,12 @@ class GmshReader {
     if (!words) fail("ends");
     return std::move(*words);
   }
-  /// A number in text, whatever the rest of the file is.
+  /// Reads a number as text, also in a binary file.
   double textNumber() {
     leaveBytes();
     return text_.number();
   }
-  /// Goes behind the line that words of text were read from: binary numbers follow.
+  /// Skips the rest of a line of text in a binary file: binary numbers follow.
   void endLine() {
     leaveBytes();
     if (binary_) text_.line();
@@ -85,7 +86,7 @@ class GmshReader {
     bytes_at_ += sizeof(Stored);
     return value;
   }
-  /// A count: version 2 has integers of 4 bytes, version 4 of 8.
+  /// Reads a count. Binary integers have 8 bytes if `wide` (version 4), else 4 (version 2).
   uint64_t nextCount(bool wide) {
     const int64_t count = wide || !binary_ ? next<int64_t>() : next<int32_t>();
     if (count < 0 || static_cast<uint64_t>(count) > size()) fail(fmt::format("counts {} numbers", count));
@@ -97,7 +98,7 @@ class GmshReader {
     return static_cast<uint64_t>(tag);
   }
 
-  /// Goes behind the line "$EndNAME".
+  /// Skips everything up to the end of the line `end`, such as "$EndNodes".
   void skipTo(const std::string& end) {
     leaveBytes();
     uint64_t at = text_.offset();
@@ -137,7 +138,7 @@ class GmshReader {
   std::shared_ptr<const PooledFile> file_;
   TextReader text_;
   bool binary_ = false, swap_ = false;
-  uint64_t bytes_at_ = 0;  // of the next binary number; 0: text is read
+  uint64_t bytes_at_ = 0;  // position of the next binary number; 0: text is read
   std::vector<std::byte> buffer_;
   size_t used_ = 0;
 };

@@ -1,4 +1,5 @@
-// The numbers ("tags") of nodes or elements of a Gmsh file, which may be in any order.
+// Finds nodes or elements of a Gmsh file by their numbers ("tags"), which may be in any order. One thread
+// adds them.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +12,8 @@
 
 namespace curvisplat {
 
-/// The index of each number ("tag") of nodes or elements in the order of the file. Numbers that follow one another need nothing,
-/// others a table on disk.
+/// Maps each tag to its index in the order of the file. Consecutive tags need no memory; others need a table
+/// on disk.
 class GmshTags {
  public:
   GmshTags(const std::shared_ptr<SpoolFile>& spool, const std::string& file, const char* what)
@@ -28,7 +29,7 @@ class GmshTags {
   }
   uint64_t count() const { return count_; }
 
-  /// All tags have been added. Throws Error if they are too far apart for a table.
+  /// Ends the additions, and makes the table. Throws Error if the tags are too far apart for one.
   void finish();
 
   /// Replaces each tag by its index; kNowhere where there is none. Any thread, after finish().

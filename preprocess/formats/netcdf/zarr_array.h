@@ -1,5 +1,5 @@
-// The metadata of an array of a Zarr store, version 2 or 3: its shape, its chunks, the type of its values, and the
-// codecs that its chunks are stored with. Pure, but for reading text: any thread.
+// The metadata of an array of a Zarr store, version 2 or 3: its shape, its chunks, the type of its values,
+// and the codecs that its chunks are stored with. Pure functions: any thread may call.
 //
 //   version 2   NAME/.zarray, NAME/.zattrs       chunks NAME/0.1.2 or NAME/0/1/2
 //   version 3   NAME/zarr.json                   chunks NAME/c/0/1/2; shards hold several chunks and their index
@@ -35,10 +35,10 @@ enum class ZarrNumber {
   kDouble
 };
 
-/// How the bytes of values become those of a file; several in turn.
+/// One of the steps that turn the bytes of a chunk's values into those of its file.
 struct ZarrCodec {
-  enum class Kind { kZlib, kZstd, kBlosc, kLz4, kShuffle, kChecksum } kind;  // kZlib: gzip, too
-  size_t element_bytes = 0;                                                  // of kShuffle
+  enum class Kind { kZlib, kZstd, kBlosc, kLz4, kShuffle, kChecksum } kind;  // kZlib: also gzip
+  size_t element_bytes = 0;                                                  // for kShuffle
 };
 
 struct ZarrArray {
@@ -47,31 +47,32 @@ struct ZarrArray {
   std::vector<uint64_t> shape, chunks;  // [axis]
   std::vector<uint64_t> shards;         // [axis]: chunks in a file; all 1 without shards
   std::vector<std::string> dimensions;  // [axis]; empty where the file has no name
-  std::vector<size_t> stored_axes;      // [axis in a chunk, slowest first]: of the array
+  std::vector<size_t> stored_axes;      // [axis of a chunk, slowest first] axis of the array
   ZarrNumber number = ZarrNumber::kNone;
   enum class Text { kNone, kBytes, kUtf32, kVariable } text = Text::kNone;
-  size_t value_bytes = 0;  // of a stored value; 0: of variable length
+  size_t value_bytes = 0;  // bytes of a stored value; 0: variable length
   bool big_endian = false;
-  double fill = std::numeric_limits<double>::quiet_NaN();  // of chunks that no file has
+  double fill = std::numeric_limits<double>::quiet_NaN();  // value of chunks that have no file
   std::vector<ZarrCodec> codecs;                           // in the order of writing
-  bool sharded = false, index_first = false;               // a shard's index: before its chunks
-  bool index_checked = false;                              // four bytes of checksum follow the index
-  std::string prefix, separator;                           // of chunks' names
+  bool sharded = false, index_first = false;               // index_first: a shard's index precedes its chunks
+  bool index_checked = false;                              // a checksum of four bytes follows the index
+  std::string prefix, separator;                           // of the names of chunks' files
   std::string refused;                                     // why values cannot be read; empty if they can
   std::map<std::string, NetcdfAttribute> attributes;
 
   uint64_t chunkValues() const;
   uint64_t chunkBytes() const { return chunkValues() * value_bytes; }
   uint64_t chunksInShard() const;
-  /// The nc_type of its values.
+  /// The type of the values, as NetCDF's nc_type.
   int type() const;
 };
 
-/// The attributes in the JSON text of a .zattrs file. `file`: for messages. Throws Error.
+/// Parses the attributes in the JSON text of a .zattrs file. `file` is its name, for messages. Throws Error.
 std::map<std::string, NetcdfAttribute> zarrAttributes(std::string_view text, const std::string& file);
 
-/// An array of version 2 by the texts of its .zarray and .zattrs. Throws Error for what is not metadata of an
-/// array, and for chunks larger than 500 MiB; what is only not read here is `refused`.
+/// Parses an array of version 2 from the texts of its .zarray and .zattrs. Throws Error if the metadata is
+/// invalid or chunks are larger than 500 MiB. If it is valid but not supported (a codec, a filter, a type),
+/// `refused` says why.
 ZarrArray zarrArray2(const std::string& name, std::string_view array, std::string_view attributes,
                      const std::string& file);
 

@@ -10,8 +10,9 @@
 
 namespace curvisplat {
 
-/// The bytes that the codecs of `array` have made `bytes` of. Throws Error, with `place`, if they are damaged, or not
-/// exactly as many as the array's chunks have: of values of variable length, at most 16 MiB.
+/// Decodes `bytes`, a stored chunk, by the codecs of `array`. Throws Error, which names `place`, if they are
+/// damaged or do not decode to exactly a chunk's bytes. A chunk of values of variable length may have up to
+/// 16 MiB.
 std::vector<std::byte> decodedZarr(const ZarrArray& array, std::vector<std::byte> bytes,
                                    const std::string& place);
 

@@ -45,7 +45,8 @@ class ZarrFile final : public NetcdfFile {
     std::list<Chunk> chunks;  // the last used first
     size_t bytes = 0;
   };
-  /// Values along the last axis of a box, `stride` bytes apart; null where the chunk was not written.
+  /// Receives `count` values along the last axis of a box, `stride` bytes apart, for the places from `to` on.
+  /// `from` is null if the chunk was not written.
   using UseRun = std::function<void(const std::byte* from, size_t stride, size_t count, size_t to)>;
 
   void addArray(ZarrArray array);
@@ -66,7 +67,7 @@ class ZarrFile final : public NetcdfFile {
   mutable std::vector<Cache> caches_ GUARDED_BY(mutex_);  // [variable]
 };
 
-/// Whether it is a NetCDF file, as NetcdfFile::recognises() sees it, or a Zarr store.
+/// Whether the path is a NetCDF file (NetcdfFile::recognises()) or a Zarr store.
 bool isNetcdf(const std::filesystem::path& path);
 
 /// Opens a NetCDF file or a Zarr store. Throws Error.

@@ -1,5 +1,5 @@
-// The files of a Zarr store: a folder, or a ZIP archive whose members are stored as they are, as zarr writes it. Any
-// number of threads may read.
+// The files of a Zarr store, which is a folder, or a ZIP archive that does not compress its members, as zarr
+// writes it. Any number of threads may read.
 #pragma once
 
 #include <cstdint>
@@ -25,17 +25,17 @@ struct ZarrValue {
 
 class ZarrStore {
  public:
-  /// Throws Error if it is an archive that is damaged or has a list of more than 256 MiB.
+  /// Throws Error if the path is an archive that is damaged or whose list of members exceeds 256 MiB.
   explicit ZarrStore(const std::filesystem::path& path);
 
-  /// nullopt if there is no such file: the chunk or the attributes were not written. `key`: "NAME/.zarray". Throws
-  /// Error for a member of an archive that is compressed by it.
+  /// Finds a file by its path in the store, such as "NAME/.zarray". Gives nullopt if it does not exist: the
+  /// chunk or the attributes were not written. Throws Error if it is a compressed member of an archive.
   std::optional<ZarrValue> find(const std::string& key) const;
-  /// The name of a file, for messages.
+  /// The file's name for messages: the store's path and the key.
   std::string nameOf(const std::string& key) const { return (path_ / key).string(); }
-  /// The folders of the store's root, in order.
+  /// Names of the folders in the store's root, sorted.
   std::vector<std::string> folders() const;
-  /// Whether the files below a folder have `bytes` bytes or more. Looks at no more than it needs.
+  /// Whether the files below a folder have `bytes` bytes or more in sum. Stops as soon as they have.
   bool hasBytes(const std::string& folder, double bytes) const;
 
  private:
