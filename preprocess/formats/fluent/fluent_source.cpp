@@ -33,14 +33,15 @@ constexpr const char *kCaseEnding = ".cas.h5", *kDataEnding = ".dat.h5";
 constexpr uint64_t kAtOnce = 65536;
 constexpr double kMaxNumber = 1e14;
 
-/// A part of a list: the rows of an array that belong to the numbers [first, first + count), from 0.
+/// A section of a list: the rows of `array` are those of the nodes, faces or cells [first, first + count),
+/// counted from 0.
 struct Section {
   std::shared_ptr<const Hdf5Array> array;
   uint64_t first = 0, count = 0;
 };
 using Sections = std::vector<Section>;
 
-/// Numbers [first, end), from 0.
+/// A range [first, end) of nodes, faces or cells, counted from 0.
 struct Range {
   uint64_t first = 0, end = 0;
   bool has(uint64_t n) const { return n >= first && n < end; }
@@ -53,7 +54,7 @@ uint64_t numberIn(const Hdf5Contents& file, const std::string& place, const char
   return static_cast<uint64_t>(number);
 }
 
-/// The attributes minId and maxId.
+/// Reads the range that the attributes minId and maxId state, counted from 1.
 Range rangeOf(const Hdf5Contents& file, const std::string& place) {
   const uint64_t first = numberIn(file, place, "minId"), last = numberIn(file, place, "maxId");
   if (first == 0 || last + 1 < first)
@@ -71,7 +72,7 @@ Section sectionOf(const Hdf5Contents& file, const std::string& place, const Rang
   return section;
 }
 
-/// The sections of a group that are data sets, in the order of their numbers.
+/// The data sets of a group as sections, in the order of their numbers.
 Sections sectionsIn(const Hdf5Contents& file, const std::string& group) {
   Sections sections;
   for (const std::string& name : file.names(group))
@@ -82,7 +83,8 @@ Sections sectionsIn(const Hdf5Contents& file, const std::string& group) {
   return sections;
 }
 
-/// Calls use(section, first row, rows, index in [first, first + count)) for each section that has some of these numbers.
+/// Calls use(section, first row, rows, offset from `first`) for each section that has some of [first, first +
+/// count).
 template <typename Use>
 void forEachIn(const Sections& sections, uint64_t first, uint64_t count, const Use& use) {
   for (const Section& section : sections) {
@@ -96,7 +98,8 @@ uint64_t componentsOf(const Section& section) {
   return section.count == 0 ? 1 : section.array->size() / section.count;
 }
 
-/// The file of a case that belongs to its data, or of data to their case, by its name; empty if there is none.
+/// The file whose name ends in `to` where that of `path` ends in `from`, which leads from a case to its data
+/// and back; empty if there is none.
 fs::path otherFileOf(const fs::path& path, std::string_view from, std::string_view to) {
   std::string name = path.string();
   if (!name.ends_with(from)) return {};
@@ -228,7 +231,8 @@ std::vector<Range> FluentSource::parentsIn(const std::string& group) const {
   return parents;
 }
 
-/// The faces that Fluent has made of those on the two sides of an interface. The cells are closed without them.
+/// The faces that Fluent makes where those on the two sides of an interface overlap. The cells are closed
+/// without them.
 std::vector<Range> FluentSource::interfaceFaces() const {
   const std::string group = at("/faces/interface"), table = group + "/nciTopology";
   std::vector<Range> made;
@@ -273,7 +277,7 @@ void FluentSource::sortFaces() {
       spools_);
 }
 
-/// Says what zones there are. Names are one text, separated by semicolons.
+/// Lists the zones. Their names are one text, separated by semicolons.
 void FluentSource::noteZones() {
   for (const char* kind : {"cells", "faces"}) {
     std::string names = file_.textOf(fmt::format("{}/{}/zoneTopology/name", kMesh, kind));
@@ -322,7 +326,7 @@ void FluentSource::addField(const std::string& name, Sections sections) {
       return;
     }
   }
-  // Other names for Fluent's. SV_P is not the pressure: it is above that of the case.
+  // Further names for Fluent's. SV_P has none: it is the pressure above the operating pressure of the case.
   static const std::map<std::string, std::string> kAliases = {{"SV_U", "velocityx"},
                                                               {"SV_V", "velocityy"},
                                                               {"SV_W", "velocityz"},
@@ -338,7 +342,7 @@ void FluentSource::addField(const std::string& name, Sections sections) {
   fields_.push_back(std::move(sections));
 }
 
-/// The time of a transient run is among the variables of Fluent's own language: (flow-time 0.25).
+/// The time of a transient run, which is a variable in Fluent's own language: (flow-time 0.25).
 void FluentSource::readTime() {
   constexpr std::string_view kTime = "(flow-time ";
   const std::string variables = data_->textOf("/settings/Data Variables");
@@ -377,7 +381,8 @@ void FluentSource::appendCells(uint32_t, uint64_t first, uint64_t count, MeshCel
                                     });
                         },
                         faces_, corners_};
-  // Cells that are divided have no faces of their own: those between them go in chunks.
+  // Divided cells have no faces of their own, and are cells of no kind; the cells between them are added in
+  // runs.
   for (uint64_t n = 0; n < count;) {
     const auto divided = [&](uint64_t cell) {
       return std::any_of(parents_.begin(), parents_.end(),

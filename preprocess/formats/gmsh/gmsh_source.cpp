@@ -102,12 +102,12 @@ class GmshSource final : public ElementSource {
   explicit GmshSource(const OpenGridOptions& options);
 
  private:
-  /// Elements of one kind, one after another.
+  /// A run of elements of one kind.
   struct Block {
     const Element* element = nullptr;
     uint64_t count = 0, nodes = 0;  // nodes: of the first one, in nodes_
   };
-  /// A section of values.
+  /// Where a section of values is, and what it holds.
   struct Data {
     std::string name;
     Centring centring = Centring::kNode;
@@ -254,7 +254,7 @@ const Element& GmshSource::elementOf(int type) const {
               reader_.name(), type);
 }
 
-/// Adds an element with a volume, or passes over another one.
+/// Adds an element if it has a volume, and skips it otherwise.
 void GmshSource::readElement(const Element& element, uint64_t tag, NumberSpool<uint64_t>& nodes) {
   if (element.kind == CellKind::kNone) {
     for (size_t n = 0; n < element.nodes; ++n) reader_.nextTag(version4_);
@@ -321,7 +321,7 @@ void GmshSource::readElements() {
   element_tags_.finish();
 }
 
-/// Reads what a section of values is: names, real and whole numbers, in text.
+/// Reads the header of a section of values: its names, real numbers and integers, which are always text.
 void GmshSource::readDataHeader(Centring centring) {
   Data data;
   data.centring = centring;
@@ -390,7 +390,7 @@ void GmshSource::addFields(std::optional<uint32_t> time_step) {
   }
 }
 
-/// Spools the values of all samples, in their order: NaN where the sections have none.
+/// Spools the values of all samples, in their order; NaN for samples that the sections leave out.
 SpooledNumbers GmshSource::valuesOf(const std::vector<const Data*>& sections, uint64_t samples,
                                     const GmshTags& tags) {
   const uint64_t components = sections.front()->components;

@@ -209,7 +209,8 @@ void refuseCodec(ZarrArray& array, const std::string& name) {
   refuse(array, fmt::format("is stored with the codec '{}', which is not read; {}", name, kRewrite));
 }
 
-/// The codecs of version 3: of arrays (transpose, sharding), into bytes, of bytes.
+/// Adds the codecs of version 3: those that change arrays (transpose, sharding), one that makes bytes of
+/// values, those that change bytes.
 void addCodecs3(ZarrArray& array, const JsonField& codecs, bool in_shard) {
   for (const JsonField& codec : codecs.elements(kMaxRank)) {
     const std::string name = codec.isText() ? codec.text() : codec.at("name").text();
@@ -255,7 +256,7 @@ void addCodecs3(ZarrArray& array, const JsonField& codecs, bool in_shard) {
   }
 }
 
-/// Sets what both versions have in common, once the types are known.
+/// Sets what both versions share, once the types are known.
 void complete(ZarrArray& array, const JsonField& metadata, const std::string& file) {
   const size_t rank = array.shape.size();
   if (array.chunks.size() != rank)

@@ -62,7 +62,7 @@ std::optional<size_t> decodeBlosc(std::span<const std::byte> from, std::span<std
   return done >= 0 && static_cast<size_t>(done) == count ? std::optional(count) : std::nullopt;
 }
 
-/// A block of LZ4 behind the number of its decompressed bytes.
+/// Decodes a block of LZ4, which follows the number of its decompressed bytes.
 std::optional<size_t> decodeLz4(std::span<const std::byte> from, std::span<std::byte> to) {
   constexpr size_t kCountBytes = 4;
   if (from.size() < kCountBytes) return std::nullopt;
@@ -72,8 +72,8 @@ std::optional<size_t> decodeLz4(std::span<const std::byte> from, std::span<std::
   return done < 0 ? std::nullopt : std::optional(static_cast<size_t>(done));
 }
 
-/// Bytes of elements that were sorted by their place in the element. Those behind the last whole element are as they
-/// were.
+/// Undoes a shuffle, which stores the first bytes of all elements, then their second ones, and so on. Bytes
+/// after the last whole element are not shuffled.
 Bytes unshuffled(const Bytes& from, size_t element_bytes) {
   Bytes to = from;
   const size_t elements = from.size() / element_bytes;
@@ -82,7 +82,7 @@ Bytes unshuffled(const Bytes& from, size_t element_bytes) {
   return to;
 }
 
-/// Castagnoli's CRC, of which the bits are reversed.
+/// CRC-32C (Castagnoli's polynomial, in reversed bits).
 uint32_t crc32c(std::span<const std::byte> bytes) {
   static const std::array<uint32_t, 256> table = [] {
     std::array<uint32_t, 256> made{};

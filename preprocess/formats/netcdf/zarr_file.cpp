@@ -112,7 +112,7 @@ std::string utf8Of(const std::byte* from, size_t characters, bool swap) {
   return text;
 }
 
-/// Strings of variable length: their number, and each behind its number of bytes.
+/// Decodes strings of variable length: their number, then each string after its number of bytes.
 std::vector<std::string> stringsIn(const std::vector<std::byte>& bytes, const std::string& place) {
   const auto countAt = [&](size_t at) -> size_t {
     if (at > bytes.size() || bytes.size() - at < 4)
@@ -211,7 +211,8 @@ size_t ZarrFile::dimensionOf(const ZarrArray& array, size_t axis) {
   return dimensions_.size() - 1;
 }
 
-/// An array declares any size in a few bytes. Compression by more than this is not known.
+/// Refuses an array that declares many more bytes than its chunks can hold: a few bytes of metadata may
+/// declare any size.
 void ZarrFile::requirePossible(const ZarrArray& array) const {
   constexpr double kMaxCompression = 40000, kSmall = 64 << 20;
   auto bytes = static_cast<double>(std::max<size_t>(1, array.value_bytes));
@@ -262,7 +263,8 @@ std::shared_ptr<const ZarrFile::Bytes> ZarrFile::loaded(const ZarrArray& array,
   std::string place = store_.nameOf(key);
   uint64_t first = 0, count = value->size;
   if (array.sharded) {
-    // The index of a shard: of each chunk where it begins, and its bytes; all ones for a chunk that was not written.
+    // The index of a shard has the offset and the size of each chunk, all ones for a chunk that was not
+    // written.
     constexpr uint64_t kEntry = 16, kNone = UINT64_MAX;
     const uint64_t index_bytes = kEntry * array.chunksInShard() + (array.index_checked ? 4 : 0);
     if (value->size < index_bytes)
