@@ -123,7 +123,7 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
     removeScratch(journal_, output);
     partial_->clear();
   }
-  // Noted before it is made: no kill leaves one behind that no one knows of.
+  // The journal names the folder before it is made, so that no kill leaves one that is not known.
   journal_ = {std::move(facts), ScratchFolder::newPath(fs::absolute(temporary_folder), scratchName(output)),
               std::nullopt};
   writeJournalNow();

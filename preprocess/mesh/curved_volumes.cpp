@@ -48,7 +48,7 @@ class HexahedronVolumes final : public CurvedVolumes {
     std::vector<glm::dvec3> lattice(along * along * along);
     for (size_t n = 0; n < nodes.size(); ++n)
       lattice[(places_[n][2] * along + places_[n][1]) * along + places_[n][0]] = nodes[n];
-    // Along i, then j, then k: [value or slope of each axis so far].
+    // Interpolates along i, then j, then k: [value or slope of each axis so far].
     std::vector<std::array<glm::dvec3, 2>> rows(points * along * along);  // [k][j][point]
     for (size_t row = 0; row < along * along; ++row)
       for (size_t u = 0; u < points; ++u) {

@@ -183,7 +183,7 @@ bool fitToLayers(const CellAtFaces& at, const CellOnLattice& cell) {
   if ((way(0) != 0) + (way(1) != 0) + (way(2) != 0) < 2) return false;
   for (int axis = 0; axis < 3; ++axis) {
     if (!at.lines[axis].isThere()) continue;
-    // By the rounded row: it is all that there is to undo it by, where the face turns out to be a joint
+    // Uses the rounded row: if the face turns out to be a joint, nothing else is left to undo this
     // (joint_sides.cpp).
     const bool is_half = at.inwards[axis] != 0;
     const LayerFit fit = is_half ? fitAtFace(at.lines[axis]) : fitBehindFace(at.lines[axis]);

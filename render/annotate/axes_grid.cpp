@@ -191,7 +191,7 @@ void drawAxesGrid(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3&
       addSide(cairo, scene, box, axis, upper);
       setInk(cairo, ink, 0.2);
       cairo_stroke(cairo);
-      // Its edges.
+      // The edges of the side.
       for (const int along : {(axis + 1) % 3, (axis + 2) % 3})
         for (const bool other : {false, true}) {
           const bool axis_first = (along + 1) % 3 == axis;

@@ -287,7 +287,7 @@ class ValuePainter final : public Painter {
       const double u0 = (at.x + 0.5 - splat_.half.x) * splat_.half.per_l11;
       const double u1 = (at.y + 0.5 - splat_.half.y - splat_.half.l21 * u0) * splat_.half.per_l22;
       const double z = depth.middle + depth.by[0] * u0 + depth.by[1] * u1;
-      // Where in the splat: its depths are taken for a uniform distribution of their deviation.
+      // The place within the splat, whose depths are taken to be uniform with their deviation.
       const double behind = (2 * std::clamp(part, 0.0, 1.0) - 1) * std::numbers::sqrt3 / depth.per_depth;
       painter_.halves_[tile_].target[pixel] = HalfTile::kFound;
       painter_.take(splat_, painter_.found_[tile_].values[pixel], {at.x, at.y, u0, u1, z + behind});

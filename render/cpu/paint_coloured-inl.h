@@ -76,7 +76,7 @@ HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const 
     store(half_width, out.pieces.half_width);
     store(correlation, out.correlation);
     store(hn::Mul(support, slope), out.slope_reach);
-    // As in setUp(): how far cuts move the mean, and how much narrower they make the distribution.
+    // How far cuts move the mean, and how much narrower they make the distribution, as in setUp().
     const V cut = hn::Load(d, visits.cut.at + lane);
     const V moved = hn::Mul(hn::Mul(hn::Abs(correlation), half_width), hn::Set(d, kReachOfHalfWidth));
     const V kept = hn::Sqrt(hn::Max(hn::NegMulAdd(correlation, correlation, one), zero));

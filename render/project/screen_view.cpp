@@ -72,7 +72,7 @@ CutView ScreenView::cutView() const {
   const double edge_x = (0.5 * size.width + reach) / focal_px,
                edge_y = (0.5 * size.height + reach) / focal_px;
   for (const glm::dvec3& side : {edge_x * right, -edge_x * right, edge_y * down, -edge_y * down}) {
-    // Where the edge lies: at `side` from the eye's axis; in perspective, at distance 1 along it.
+    // The edge lies at `side` from the eye's axis; in perspective, at distance 1 along it.
     const double edge = glm::length(side);
     const glm::dvec3 outwards = side / edge;
     if (cut.perspective) {

@@ -78,7 +78,7 @@ void removeAbandoned(const std::filesystem::path& folder, const TemporaryNames& 
       SystemCalls::current().close(fd);
     }
   } catch (...) {
-    // They are in nobody's way.
+    // Files that cannot be removed do no harm.
   }
 }
 

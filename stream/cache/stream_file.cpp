@@ -47,7 +47,7 @@ FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span
   records.reserve(table.size());
   for (const BrickVariable& variable : table) records.push_back(recordOf(variable));
   if (histogram) {
-    // It ends where the table begins.
+    // The histogram ends where the table begins.
     const HistogramRecord record = recordOf(*histogram);
     const bool has_percentiles = !histogram->percentiles.empty();
     const uint64_t bytes = sizeof record + (has_percentiles ? sizeof(PercentilesRecord) : 0);

@@ -167,7 +167,7 @@ class GeometryEncoder {
     for (size_t n = 0; n < count_; ++n) {
       const double weight = brick_.splats[n].weight, volume = decoded_.axis[2][n];
       exact += weight;
-      // As encodeWeights(): other weights have codes of their own, and errors either way.
+      // Decides as encodeWeights() does: other weights have codes of their own, and errors either way.
       decoded += std::abs(weight - volume) < 0.5 * kWeightStep * volume ? volume : weight;
     }
     const double ratio = exact / decoded;
@@ -243,7 +243,7 @@ class GeometryEncoder {
     std::vector<uint32_t> order;
     for (uint32_t n = 0; n < count_; ++n)
       if (brick_.splats[n].weight > 0 && (targets_[n] - steps_[n]) * more > 0) order.push_back(n);
-    // In 1/64 of a step: equal cells differ by the rounding of their numbers.
+    // The gain is rounded to 1/64 of a step, since equal cells differ by the rounding of their numbers.
     const auto gain = [&](uint32_t n) { return std::nearbyint((targets_[n] - steps_[n]) * more * 64); };
     std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return gain(a) > gain(b); });
     for (const uint32_t n : order) {

@@ -117,7 +117,7 @@ TEST(CacheVersions, UnknownVersionsAreRefusedWithAdvice) {
          {std::vector<std::string>{"info", cache}, {"render", cache, "-o", picture}}) {
       expectRefused(command, 1, {fmt::format("version {}", version), what_to_do});
     }
-    // And do it.
+    // Does what the message says.
     const std::string grid = folder / "grid";
     run({"generate", "wake", "--size", "8x8x8", "-o", grid});
     const std::vector<std::string> convert{"convert", grid + ".xyz", grid + ".fun", "-o", cache};

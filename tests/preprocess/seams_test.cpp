@@ -182,12 +182,12 @@ TEST_F(Seams, LeaveNoFaceToTheLayerBehindThem) {
   EXPECT_TRUE(codeAt(1, 2, 2).behind);
   EXPECT_TRUE(codeAt(9, 3, 2).behind);
   EXPECT_TRUE(codeAt(3, 2, 4).behind);
-  // On the seam.
+  // The nodes on the seam.
   EXPECT_EQ(codeAt(5, 2, 2).count, 0);
   EXPECT_EQ(layersOf(bitsAt(5, 2, 2)), 0u);
   EXPECT_TRUE(codeAt(5, 2, 1).behind);
   EXPECT_EQ(layersOf(bitsAt(5, 1, 1)), 3u);
-  // Behind the seam and two faces.
+  // Nodes behind the seam and two faces.
   EXPECT_EQ(codeAt(4, 1, 1).count, 0);
   EXPECT_EQ(layersOf(bitsAt(4, 1, 1)), 3u);
   EXPECT_EQ(layersOf(bitsAt(1, 1, 1)), 7u);

@@ -404,7 +404,7 @@ TEST(Slabs, OfBlocksSmallAndLargeComeInOrder) {
       }
       EXPECT_EQ(count, all.size());
     }
-  // And some of them.
+  // Streams only some of the slabs.
   std::vector<Slab> some = cutIntoSlabs(blocks, 100'000, kNoHalo);
   std::erase_if(some, [](const Slab& slab) { return slab.block % 3 != 1; });
   SlabStream slabs(reader, 1 << 20, some);

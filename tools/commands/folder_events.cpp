@@ -49,7 +49,7 @@ void FolderEvents::close() {
 
 /// All of the folders, or none.
 void FolderEvents::watch() {
-  // Not IN_MODIFY: of a file that is being written there may be thousands.
+  // IN_MODIFY is left out: a file that is being written may cause thousands.
   constexpr uint32_t kChanges =
       IN_CREATE | IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR | IN_DELETE_SELF | IN_MOVE_SELF;
   if (std::any_of(folders_.begin(), folders_.end(), isRemote)) return;

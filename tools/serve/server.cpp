@@ -165,7 +165,7 @@ class Server : public ConnectionHost {
         connection->start();
       }
       if (!error) return accept();
-      // Such as no descriptor left: it fails again at once, until a connection ends.
+      // With no descriptor left, for example, it fails again at once, until a connection ends.
       pause_.expires_after(kPauseAfterError);
       pause_.async_wait([this](const ErrorCode& stopped) {
         if (!stopped) accept();

@@ -67,7 +67,7 @@ std::optional<glm::dvec2> CacheView::placeOf(const glm::dvec3& point, const Wind
 
 void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
   const auto place = [&](const glm::dvec3& point) { return placeOf(point, layout); };
-  // Not over the scalar bars.
+  // Draws only within the picture, not over the scalar bars.
   const Rectangle& whole = layout.picture;
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   list->PushClipRect(toImGui(whole.x, whole.y),

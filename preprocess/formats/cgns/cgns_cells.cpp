@@ -156,7 +156,7 @@ uint64_t CgnsCells::faceOf(int64_t element) const {
 }
 
 void CgnsCells::readFaceBegins(uint64_t first, std::span<uint64_t> to) const {
-  // Behind the last face of all: where its points end.
+  // The entry after the last face of all says where its points end.
   std::span<uint64_t> left = to;
   if (first + to.size() == first_face_.back() + 1) {
     left = to.first(to.size() - 1);

@@ -114,7 +114,7 @@ void TreeReader::readFamilyType(const CgnsNode& family) {
     for (const CgnsNode& child : file_.children(family))
       if (child.label == "FamilyBC_t") family_types_[family.name] = file_.text(child);
   } catch (const Error&) {
-    // As with boundaries.
+    // The volume does not need the types of families, either.
   }
 }
 

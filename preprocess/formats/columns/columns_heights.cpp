@@ -272,7 +272,7 @@ std::vector<double> ColumnsHeightsReader::read(uint64_t first, uint64_t count, u
     heights.assign(from, from + static_cast<ptrdiff_t>(count));
     return heights;
   }
-  // Between two middles; beyond the last that there is, as far as the other end of its layer.
+  // A boundary lies between two middles; beyond the last one, as far as the other end of its layer.
   const uint64_t begin = level < 2 ? 0 : level - 2, end = std::min(level + 2, heights_.count);
   const std::vector<double> middles = stored(first, count, begin, end - begin);
   for (uint64_t n = 0; n < count; ++n) {

@@ -36,7 +36,7 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     const bool faces = hasDimension(variable, map.face_dim);
     if (faces == hasDimension(variable, map.node_dim)) continue;
     const size_t across = faces ? map.face_dim : map.node_dim;
-    // Besides the layers: time, and dimensions of length 1.
+    // The other dimensions: time, and those of length 1.
     std::vector<size_t> others;
     std::optional<size_t> time;
     for (size_t axis = 0; axis < variable.dims.size(); ++axis) {

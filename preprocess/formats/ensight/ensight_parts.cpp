@@ -192,7 +192,7 @@ void GeometryReader::readBlock(const std::string& words, EnsightPart& part) {
   }
   if (has("iblanked")) part.iblank = file_.integers(part.points);
   next_ = file_.keyword();
-  // Not needed: ghosts of cells, numbers of nodes and of elements.
+  // Skips what is not needed: ghosts of cells, numbers of nodes and of elements.
   if (next_.starts_with("ghost_flags")) {
     file_.integers(part.cells);
     next_ = file_.keyword();

@@ -99,7 +99,8 @@ NetcdfFile::~NetcdfFile() {
 
 void NetcdfFile::release() const {
   const QuietHdf5 quiet;
-  // Its name goes (unpacked_file.h): it stays open, without what its variables' caches hold.
+  // An unpacked file loses its name (unpacked_file.h), so it stays open; only its variables' caches are
+  // emptied.
   if (path_.parent_path().extension() == ".unpacked") return emptyCaches();
   if (file_ >= 0) nc_close(file_);
   file_ = -1;
