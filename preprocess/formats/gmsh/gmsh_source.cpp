@@ -107,7 +107,7 @@ class GmshSource final : public ElementSource {
     const Element* element = nullptr;
     uint64_t count = 0, nodes = 0;  // nodes: of the first one, in nodes_
   };
-  /// Where a section of values is, and what it holds.
+  /// The header of a section of values, and where they begin.
   struct Data {
     std::string name;
     Centring centring = Centring::kNode;
