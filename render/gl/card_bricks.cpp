@@ -70,7 +70,7 @@ bool CardBricks::has(uint32_t brick) const {
   return bricks_.contains(brick);
 }
 
-/// As far as is known.
+/// The words of the part's brick, as far as is known.
 uint64_t CardBricks::wordsOf(const StoredPart& part) const {
   const auto found = known_.find(part.brick);
   return kStoredArrays * part.splats + (found == known_.end() ? 0 : found->second.words());

@@ -41,7 +41,7 @@ class CardBricks {
   uint64_t cardBytes() const { return words_.bytes() + parts_.bytes() + groups_.bytes(); }
 
  private:
-  /// What was once put, whether it still lies there or not.
+  /// The pieces of a brick that was put at any time, whether it is still stored or not.
   struct Known {
     std::vector<uint32_t> splats;  // numbers of those that have pieces
     std::vector<uint32_t> first;   // [splat, and beyond the last] its first piece

@@ -435,7 +435,7 @@ bool GlTilePainter::hides(const ScreenBox& box) const {
   return true;
 }
 
-/// What was drawn, until the buffer is unmapped. It goes through a buffer that the card itself writes, since drivers copy into
+/// Returns the windows, which are valid until the buffer is unmapped. The picture goes through a buffer that the card itself writes, since drivers copy into
 /// other memory much slower.
 std::span<const float> GlTilePainter::State::readWindows() {
   gl.BindTexture(GL_TEXTURE_2D_ARRAY, windows.name());

@@ -177,7 +177,7 @@ uint firstKey(vec2 at, Ellipse e, inout uint key, inout vec2 slope) {
 
 #define OF(array) uintBitsToFloat(words[at + uint(array) * n])
 
-// Where a splat lies on the screen, and the map that is linear there: a PlacedPiece, with its depth as BrickProjector::depths().
+// The place of a splat on the screen, and the map that is linear there: a PlacedPiece, with its depth as BrickProjector::depths().
 struct Place {
   vec2 pixel;
   float depth, volume;
@@ -286,7 +286,7 @@ vec4 fourAt(uint word) {
   return uintBitsToFloat(uvec4(words[word], words[word + 1u], words[word + 2u], words[word + 3u]));
 }
 
-// What the faces of a piece leave of it: as cutAtFaces() in plane_cuts.cpp, which explains it.
+// This is the result of cutAtFaces(); plane_cuts.cpp explains it.
 struct Cut {
   bool nothing;  // is left
   int count;     // of the faces that cut

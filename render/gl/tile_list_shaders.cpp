@@ -104,7 +104,7 @@ struct Listed {
   float lean, span, reach2, tip, reach_y;
 };
 
-// Of pixels at dy the ellipse covers lean dy +- span sqrt(reach2 - dy dy); it goes farthest right at dy = tip.
+// The ellipse covers the pixels lean dy +- span sqrt(reach2 - dy dy) at dy, and goes farthest right at dy = tip.
 Listed listedOf(uint n) {
   vec4 part0 = uintBitsToFloat(splats[4u * n]);
   float l11 = part0.z, l21 = part0.w, l22 = uintBitsToFloat(splats[4u * n + 1u].x);
