@@ -6,8 +6,16 @@
 #include "render/frame/frame_workers.h"
 #include "render/project/brick_store.h"
 #include "stream/base/mutex.h"
+#include "stream/model/border_code.h"
 
 namespace curvisplat {
+namespace {
+
+/// The splats at borders that a worker may divide while another one does. Their pieces take a few MiB, which its
+/// projector leaves unused meanwhile; more would pass --memory with many workers.
+constexpr size_t kMaxDividedAside = 8192;
+
+}  // namespace
 
 /// Chooses the parts that are drawn from the painter's store, if it has one, and sends what is missing there. The choice depends
 /// on nothing but the plan and the card's memory, and so do the picture's bits.
@@ -60,11 +68,21 @@ void FramePipeline::putIntoStore(std::span<const StoredPart> parts, const Border
   for (const StoredPart& part : parts) bricks.push_back({part.brick});
   Mutex putting;
   const auto put = [&](size_t part, const glm::dvec3&, const BrickSource::Splats& splats) {
-    const BrickPieces pieces = BrickPieces::of(splats.geometry, splats.values, borders);
-    const MutexLock lock(putting);
-    painting_->run([&](Painter& painter) {
-      painter.store()->put(parts[part].brick, splats.geometry, splats.values, pieces);
-    });
+    const auto send = [&](const BrickPieces& pieces) {
+      painting_->run([&](Painter& painter) {
+        painter.store()->put(parts[part].brick, splats.geometry, splats.values, pieces);
+      });
+    };
+    const uint32_t* const codes = splats.geometry.border_code;
+    const auto inner = std::count(codes, codes + splats.geometry.size(), kNoBorder);
+    if (splats.geometry.size() - static_cast<size_t>(inner) <= kMaxDividedAside) {
+      const BrickPieces pieces = BrickPieces::of(splats.geometry, splats.values, borders);
+      const MutexLock lock(putting);
+      send(pieces);
+    } else {
+      const MutexLock lock(putting);
+      send(BrickPieces::of(splats.geometry, splats.values, borders));
+    }
   };
   sample({cache_, bricks, put}, options, statistics);
 }

@@ -104,8 +104,8 @@ size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
   by_place_.clear();
   if (!is_within) words_.release();
   if (count == 0) return 0;
-  // Twice as much as is known of now, for the pieces, and for other bricks.
-  const uint64_t wanted = std::min({largest, bytes - drawn, 2 * stored});
+  // More than is known of now, for the pieces, and for other bricks.
+  const uint64_t wanted = std::min({largest, bytes - drawn, 4 * stored});
   try {
     if (words_.bytes() < stored) words_.reserve(std::max(wanted, stored));
   } catch (const Error& error) {
@@ -302,7 +302,7 @@ ProjectionCounts CardBricks::counts() const {
   ProjectionCounts counts;
   counts.off_screen = fates[0];
   counts.transparent = fates[1];
-  counts.drawn = counts.pieces = fates[2];
+  counts.drawn = fates[2];
   counts.read = counts.off_screen + counts.transparent + counts.drawn;
   return counts;
 }

@@ -42,9 +42,11 @@ uint64_t defaultBytesOf(const GlFunctions& gl) {
   return uint64_t{768} << 20;
 }
 
-/// The lists of tiles take no more than a sixth of what bricks take by default.
-GlTilePainter::Capacity within(uint64_t default_bytes, const GlTilePainter::Capacity& most) {
-  return {most.splats, std::clamp<size_t>(default_bytes / 6 / GlTileLists::kEntryBytes, 1, most.entries)};
+/// The lists of tiles take no more than a sixth of what bricks take by default, and no more than a buffer holds.
+GlTilePainter::Capacity within(const GlFunctions& gl, uint64_t default_bytes,
+                               const GlTilePainter::Capacity& most) {
+  const uint64_t bytes = std::min(default_bytes / 6, CardBuffer::largest(gl));
+  return {most.splats, std::clamp<size_t>(bytes / GlTileLists::kEntryBytes, 1, most.entries)};
 }
 
 /// An element that fills the gap before a batch's first: it is no splat, and no shader draws it.
@@ -71,7 +73,7 @@ struct GlTilePainter::State final : BrickStore {
   State(const GlFunctions& functions, const Capacity& capacity_, bool software)
       : gl(functions),
         default_bytes(software ? 0 : defaultBytesOf(functions)),
-        capacity(software ? capacity_ : within(default_bytes, capacity_)),
+        capacity(software ? capacity_ : within(functions, default_bytes, capacity_)),
         tables(gl),
         lists(gl, timers),
         splats(gl),
@@ -353,8 +355,8 @@ void GlTilePainter::State::paintBox(const ListedSplats& listed, const CardTiles&
   }
   lists.make(listed, tiles, box, entries);
   timers.measure(kPaint, [&] { paintLists(tiles, box); });
-  most_bytes = std::max(
-      most_bytes, window_bytes + splats.bytes() + closed.bytes() + lists.cardBytes() + bricks.cardBytes());
+  most_bytes = std::max(most_bytes, 2 * window_bytes + splats.bytes() + closed.bytes() + lists.cardBytes() +
+                                        bricks.cardBytes());
 }
 
 void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box) {
@@ -435,8 +437,8 @@ bool GlTilePainter::hides(const ScreenBox& box) const {
   return true;
 }
 
-/// Returns the windows, which are valid until the buffer is unmapped. The picture goes through a buffer that the card itself writes, since drivers copy into
-/// other memory much slower.
+/// Returns the windows, which are valid until the buffer is unmapped. They go through a buffer that the card itself
+/// writes, since drivers copy into other memory much slower.
 std::span<const float> GlTilePainter::State::readWindows() {
   gl.BindTexture(GL_TEXTURE_2D_ARRAY, windows.name());
   gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, nullptr);
@@ -452,14 +454,16 @@ Image GlTilePainter::end() {
   const StageTimer timer(state.draw_s, "draw (OpenGL)");
   const GlFunctions& gl = state.gl;
   gl.BindBuffer(GL_PIXEL_PACK_BUFFER, state.drawn.name());
-  const struct Unmap {  // where there is no memory for the picture, too
+  struct Release {  // where there is no memory for the picture, too
     const GlFunctions& gl;
-    ~Unmap() {
-      gl.UnmapBuffer(GL_PIXEL_PACK_BUFFER);
+    bool is_mapped = false;
+    ~Release() {
+      if (is_mapped) gl.UnmapBuffer(GL_PIXEL_PACK_BUFFER);
       gl.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     }
-  } unmap{gl};
+  } release{gl};
   const std::span<const float> drawn = state.readWindows();
+  release.is_mapped = true;
   state.timers.finish();
   return state.tables.composite(drawn, false, state.background, state.threads);
 }

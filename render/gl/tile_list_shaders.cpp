@@ -98,6 +98,8 @@ bool isClosed(ivec2 tile) {
   return closed[closed_begin + tile.y * closed_columns + tile.x] == uint(pixels.x * pixels.y);
 }
 
+shared int first_rows[THREADS];
+
 struct Listed {
   vec2 at;      // pixels
   vec2 middle;  // the same, from the first pixel's middle
@@ -148,6 +150,7 @@ void main() {
   if (own < splat_count && uintBitsToFloat(splats[4u * own].z) >= 0.0) {  // else a record
     ivec2 of_own = rowsOf(listedOf(own));
     rows = uint(max(of_own.y - of_own.x, 0));
+    first_rows[gl_LocalInvocationID.x] = of_own.x;
   }
   sumBefore(rows);
   uint all = lane_sums[THREADS - 1u];
@@ -156,9 +159,8 @@ void main() {
     for (uint step = THREADS / 2u; step > 0u; step /= 2u)
       if (lane_sums[lane + step - 1u] <= row) lane += step;
     uint n = begin + lane;
-    Listed splat = listedOf(n);
     uint earlier = lane > 0u ? lane_sums[lane - 1u] : 0u;
-    listRow(n, splat, rowsOf(splat).x + int(row - earlier));
+    listRow(n, listedOf(n), first_rows[lane] + int(row - earlier));
   }
 }
 )";

@@ -19,7 +19,7 @@ inline constexpr uint32_t kMaxGroups = 32768;  // along x; every OpenGL has 6553
 /// Tiles whose entries are added up by one group.
 inline constexpr uint32_t kTilesAChunk = 8 * kListThreads;
 /// Entries that are sorted in shared memory; more in the card's, which takes longer.
-inline constexpr uint32_t kSortedAtOnce = 2048;
+inline constexpr uint32_t kSortedAtOnce = 1024;
 
 std::string tileListShader(TileListStep step);
 /// Declares `uvec2 rangeOf(uint tile)` for other shaders: where a tile's entries begin and end, by the buffers 1 and 2.

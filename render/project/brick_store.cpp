@@ -51,7 +51,7 @@ std::optional<BrickPieces> dividedBy(const BorderStyle& borders, const GeometryA
                                      const VariableArrays<const float>& values) {
   BrickPieces out;
   BorderPieces parts;
-  size_t further = 0;  // records beside one for each splat
+  size_t further = 0;  // records that BrickProjector::kMaxPieces limits
   for (uint32_t i = 0; i < geometry.size(); ++i) {
     const uint32_t code = geometry.border_code[i];
     if (code == kNoBorder) continue;
@@ -62,7 +62,8 @@ std::optional<BrickPieces> dividedBy(const BorderStyle& borders, const GeometryA
     out.splats.push_back({i, static_cast<uint32_t>(out.pieces.size()), static_cast<uint32_t>(count),
                           static_cast<float>(drawnSlope(slope, inward))});
     for (size_t n = 0; n < count; ++n) out.pieces.push_back(storedPiece(parts[n]));
-    further += count - 1;
+    const bool has_faces = inward.faces != 0 || layersOf(code) != 0;
+    further += has_faces ? 2 * count - 1 : count;  // as choosePieces() in projection.cpp counts them
     if (further > BrickProjector::kMaxPieces) return {};
   }
   return out;
@@ -92,7 +93,9 @@ bool BrickStore::canDraw(const Brick& brick, const glm::dvec3& cell_min, const P
   if (!std::all_of(settings.clip_planes.begin(), settings.clip_planes.end(), is_inside)) return false;
   const ScreenView& view = settings.view;
   if (view.projection == Projection::kOrthographic) return true;
-  const double radius = brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
+  constexpr double kOfPieces = 1.25;  // pieces at edges may be larger than their splats
+  const double radius =
+      kOfPieces * brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
   const double half = glm::dot(glm::abs(view.forward * view.scale), extent);
   const double nearest = view.viewFromData(middle).z - half;
   // PerspectiveMap::radiusOf() may be √3 times as large; one in a hundred is for rounding.

@@ -56,8 +56,8 @@ struct BrickPieces {
   std::vector<StoredPiece> pieces;
   bool has_too_many = false;  // then there are none, and splats at borders are drawn as any other
 
-  /// Divides the splats at borders as BrickProjector does. If there would be more than its kMaxPieces pieces, cells at
-  /// faces are one splat instead of two, and if that does not help, splats at borders are drawn as any other.
+  /// Divides the splats at borders as BrickProjector does. If the whole brick would have more than its kMaxPieces pieces,
+  /// cells at faces are one splat instead of two, and if that does not help, splats at borders are drawn as any other.
   static BrickPieces of(const GeometryArrays<const float>& geometry,
                         const VariableArrays<const float>& values, const BorderStyle& borders);
 };

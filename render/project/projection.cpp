@@ -216,6 +216,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   size_t own = how.clipped || how.layered || has_faces ? least : 0;
   const SplatPiece* part = nullptr;      // that is placed
   const SplatPiece* coloured = nullptr;  // the same, with the scalar of the colours
+  bool part_clipped = false;             // a clip plane crosses the part
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
@@ -234,7 +235,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     splat.amplitude *= by_slope.opacity;
     if (piece.growth.count > 0) splat.skew = skewOf(at.rows, piece.growth, ellipse);
     const bool whole_part = piece.position == part->position;  // perspective has not cut it up
-    if (faces && whole_part && !across && !how.clipped && !brick.colours) {
+    if (faces && whole_part && !across && !part_clipped && !brick.colours) {
       const glm::vec3 back = whole.position - piece.position;
       const float x = at.x + at.rows.x0 * back.x + at.rows.y0 * back.y + at.rows.z0 * back.z;
       const float y = at.y + at.rows.x1 * back.x + at.rows.y1 * back.y + at.rows.z1 * back.z;
@@ -273,7 +274,9 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   for (size_t n = 0; n < count; ++n) {
     part = &pass.parts[n];
     if (brick.colours) coloured = &pass.coloured_parts[n];
+    const int own_faces = pass.parts[n].faces.count;
     if (how.clipped) cutting.clip.addFaces(pass.parts[n]);
+    part_clipped = pass.parts[n].faces.count != own_faces;
     if (!place(map, pass.parts[n], left.looks, take)) return {};
   }
   return best;

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "render/frame/frame.h"
+#include "render/project/brick_store.h"
 #include "stream/base/error.h"
+#include "stream/model/border_code.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
 
@@ -172,6 +175,30 @@ TEST_F(CardBricksTest, StayAwayWithoutMemory) {
   EXPECT_EQ(statistics.card_splats, 0u);
   EXPECT_EQ(egl_->render(camera("iso"), options(1000), statistics).rgba, none.rgba);
   EXPECT_EQ(statistics.card_splats, 0u);
+}
+
+/// The pieces of `count` splats with this code.
+BrickPieces piecesOf(size_t count, uint32_t code, const BorderStyle& borders) {
+  SplatGeometry geometry;
+  SplatVariable variable;
+  geometry.resize(count);
+  variable.resize(count);
+  for (size_t n = 0; n < count; ++n) {
+    geometry.axis0[n] = geometry.axis1[n] = geometry.axis2[n] = geometry.weight[n] = 1;
+    geometry.border_code[n] = code;
+  }
+  return BrickPieces::of(arraysOf(geometry), arraysOf(variable), borders);
+}
+
+TEST(BrickPieces, AreFewerWhereABrickWouldHaveTooMany) {
+  const std::array<glm::dvec3, 3> axes{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
+  const uint32_t face = packBorderCode({axes.data(), 1}, 1), corner = packBorderCode(axes);
+  EXPECT_EQ(piecesOf(20'000, face, kWholeCellPairs).pieces.size(), 40'000u);
+  EXPECT_EQ(piecesOf(22'000, face, kWholeCellPairs).pieces.size(), 22'000u);
+  EXPECT_EQ(piecesOf(8192, corner, kHalfCellStyle).pieces.size(), 65'536u);
+  const BrickPieces none = piecesOf(8193, corner, kHalfCellStyle);
+  EXPECT_TRUE(none.has_too_many);
+  EXPECT_TRUE(none.pieces.empty() && none.splats.empty());
 }
 
 }  // namespace

@@ -38,20 +38,23 @@ BrickSplats byOctant(const BrickSplats& brick) {
 uint32_t randomBorderCode(std::mt19937_64& random) {
   std::uniform_real_distribution<double> unit(0, 1);
   const auto direction = [&] {
-    return glm::normalize(glm::dvec3(unit(random) - 0.5, unit(random) - 0.5, unit(random) - 0.5));
+    glm::dvec3 towards;
+    for (int axis = 0; axis < 3; ++axis) towards[axis] = unit(random) - 0.5;
+    return glm::normalize(towards);
   };
   const glm::dvec3 first = direction(), second = glm::normalize(glm::cross(first, direction()));
   const std::array<glm::dvec3, 3> axes{first, second, glm::cross(first, second)};
   const size_t count = 1 + random() % 3;
+  const double near = unit(random), far = unit(random);
   switch (random() % 5) {
     case 0:
       return packBorderCode({axes.data(), count}, static_cast<uint32_t>(random() % (1u << count)));
     case 1:
-      return packLayerCode(first, 0.5 + unit(random));
+      return packLayerCode(first, 0.5 + near);
     case 2:
-      return packMergedCode(first, 0.2 + 0.6 * unit(random), 0.8 + 2 * unit(random));
+      return packMergedCode(first, 0.2 + 0.6 * near, 0.8 + 2 * far);
     case 3:
-      return packLayersCode({axes.data(), 2 + random() % 2}, random() % 2);
+      return packLayersCode({axes.data(), near < 0.5 ? 2u : 3u}, far < 0.5 ? 0 : 1);
     default:
       return packPlateCode(first);
   }
