@@ -12,9 +12,10 @@ try:
     import vtk
     from vtk.util.numpy_support import vtk_to_numpy
 
-    from gmsh_files import Msh
+    from gmsh_files import LATTICES, Msh, lattice_of
     from mesh_case import MeshCase
     from mesh_cubes import RANDOM, cube
+    from mesh_curved_test import grid_of, nodes_of
     from sweep import some_of
 except ModuleNotFoundError as error:
     print(f"skipped: {error}; install python3-vtk9 and python3-numpy")
@@ -67,6 +68,60 @@ class MeshGmsh(MeshCase):
         grid = cube(kinds=("quadratic",))
         for version, order in some_of(self.VARIANTS, 3):
             self.expect_same_caches([self.written(grid, version, order)], self.vtu(grid))
+
+    def test_cells_of_higher_order(self):
+        for kind, (of_vtk, order, _) in LATTICES.items():
+            places = nodes_of(of_vtk, order)
+            number = {tuple(place.round(9)): n for n, place in enumerate(places)}
+            kinds = {of_vtk: (kind, [number[tuple(place.round(9))] for place in lattice_of(kind)])}
+            grid = grid_of(of_vtk, places + RANDOM.uniform(-0.02, 0.02, places.shape), [range(len(places))], RANDOM.random(len(places)))
+            for version, binary in some_of(self.VARIANTS[:4], 2):
+                path = Msh(grid, version, binary, kinds=kinds).mesh().data("p", vtk_to_numpy(grid.GetPointData().GetArray("p"))).write(self.folder / "a.msh")
+                self.expect_same_caches([path], self.vtu(grid), names={"c": None})
+
+    def test_elements_in_several_groups(self):
+        grid = cube(kinds=("hexahedron", "tetrahedra"))
+        for order in ("", "<"):
+            path = self.written(grid, 2.2, order, groups=3)
+            self.assertIn("repeated for further physical groups", " ".join(self.check(path, grid)["notes"]))
+
+    def test_parametric_nodes(self):
+        grid = cube(kinds=("hexahedron",))
+        for order in ("", "<"):
+            path = Msh(grid, 2.2, order).mesh(parametric=True).data("p", vtk_to_numpy(grid.GetPointData().GetArray("p"))).write(self.folder / "a.msh")
+            self.expect_same_caches([path], self.vtu(grid), names={"c": None})
+
+    def test_views_with_their_mesh(self):
+        grid, other = cube(kinds=("hexahedron",)), cube(kinds=("hexahedron",))
+        for version, order in self.VARIANTS[:4]:
+            file = Msh(grid, version, order).mesh().data("p", vtk_to_numpy(grid.GetPointData().GetArray("p")))
+            file.mesh().data("c", vtk_to_numpy(grid.GetCellData().GetArray("c")), "Element")
+            self.expect_same_caches([file.write(self.folder / "a.msh")], self.vtu(grid))
+            file.out += Msh(other, version, order).mesh().out
+            result = self.run_program("info", file.write(self.folder / "b.msh"))
+            self.assertIn("has several meshes; expected one", result.stderr)
+
+    def test_values_at_nodes_of_elements(self):
+        grid = cube(kinds=("hexahedron", "tetrahedra", "quadratic"))
+        values = vtk_to_numpy(grid.GetPointData().GetArray("p")).astype("f8")
+        path = self.folder / "a.msh"
+        for version, order in self.VARIANTS[:4]:
+            Msh(grid, version, order).mesh().data_at_nodes("p", lambda _, node: values[node]).write(path)
+            self.expect_same_caches([path], self.vtu(grid), names={"c": None})
+        # Of a node the mean.
+        file = Msh(grid).mesh().data_at_nodes("m", lambda element, node: element)
+        around = [[n for n, (_, nodes) in enumerate(file.cells) if point in nodes] for point in range(grid.GetNumberOfPoints())]
+        file.data("e", [np.mean(elements) for elements in around]).write(path)
+        self.assertEqual(self.cache([path], "m"), self.cache([path], "e"))
+
+    def test_steps_without_times(self):
+        grid = cube(2, kinds=("hexahedron",))
+        file = Msh(grid).mesh()
+        for step in (3, 8):
+            file.data("T", np.full(grid.GetNumberOfPoints(), step), time=0.0, step=step)
+        path = file.write(self.folder / "s.msh")
+        self.assertEqual(self.info(path)["times"], [3, 8])
+        self.assertEqual(self.info(path, "--time-step", 1)["scalars"][0]["min"], 8)
 
     def test_steps(self):
         grid = cube(kinds=("hexahedron",))

@@ -117,6 +117,18 @@ class GmshReader {
     }
     fail("has no " + end);
   }
+  /// Whether the file has the same bytes at two places.
+  bool isSame(uint64_t a, uint64_t b, uint64_t bytes) const {
+    std::vector<std::byte> of_a, of_b;
+    for (uint64_t n = 0; n < bytes; n += of_a.size()) {
+      of_a.resize(static_cast<size_t>(std::min(kBufferBytes, bytes - n)));
+      of_b.resize(of_a.size());
+      file_->readAt(a + n, std::span(of_a));
+      file_->readAt(b + n, std::span(of_b));
+      if (of_a != of_b) return false;
+    }
+    return true;
+  }
   void seek(uint64_t offset) {
     bytes_at_ = 0;
     text_.seek(offset);

@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -19,6 +17,8 @@
 #include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/gmsh/gmsh_data.h"
+#include "preprocess/formats/gmsh/gmsh_elements.h"
 #include "preprocess/formats/gmsh/gmsh_reader.h"
 #include "preprocess/formats/gmsh/gmsh_tags.h"
 #include "preprocess/mesh/curved_cells.h"
@@ -28,74 +28,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr uint64_t kAtOnce = 65536, kSamplesAtOnce = 1 << 20;
+constexpr uint64_t kAtOnce = 65536;
 constexpr size_t kMaxBlocks = 1'000'000, kMaxData = 100'000;
-
-// ---- kinds of elements ----
-
-struct Element {
-  int type;
-  size_t nodes;
-  CellKind kind;
-  std::array<uint8_t, 27> order{};  // of second order: Gmsh's node for each of VTK's
-};
-
-/// Source: Gmsh's reference manual, "Node ordering" and "MSH file format".
-constexpr Element kElements[] = {
-    {4, 4, CellKind::kTetrahedron},
-    {5, 8, CellKind::kHexahedron},
-    {6, 6, CellKind::kWedge},
-    {7, 5, CellKind::kPyramid},
-    {11, 10, CellKind::kTetrahedron, {0, 1, 2, 3, 4, 5, 6, 7, 9, 8}},
-    {12, 27, CellKind::kHexahedron, {0,  1,  2,  3,  4,  5,  6,  7,  8,  11, 13, 9,  16, 18,
-                                     19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26}},
-    {13, 18, CellKind::kWedge, {0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16}},
-    {14, 14, CellKind::kPyramid, {0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12, 13}},
-    {17, 20, CellKind::kHexahedron, {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15}},
-    {18, 15, CellKind::kWedge, {0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11}},
-    {19, 13, CellKind::kPyramid, {0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12}},
-    // Cells of orders above 2, which are drawn by their corners.
-    {29, 20, CellKind::kTetrahedron},
-    {30, 35, CellKind::kTetrahedron},
-    {31, 56, CellKind::kTetrahedron},
-    {92, 64, CellKind::kHexahedron},
-    {93, 125, CellKind::kHexahedron},
-    {90, 40, CellKind::kWedge},
-    {91, 75, CellKind::kWedge},
-    {118, 30, CellKind::kPyramid},
-    {119, 55, CellKind::kPyramid},
-    // Points, lines and faces.
-    {15, 1, CellKind::kNone},
-    {1, 2, CellKind::kNone},
-    {2, 3, CellKind::kNone},
-    {3, 4, CellKind::kNone},
-    {8, 3, CellKind::kNone},
-    {9, 6, CellKind::kNone},
-    {10, 9, CellKind::kNone},
-    {16, 8, CellKind::kNone},
-    {20, 9, CellKind::kNone},
-    {21, 10, CellKind::kNone},
-    {22, 12, CellKind::kNone},
-    {23, 15, CellKind::kNone},
-    {24, 15, CellKind::kNone},
-    {25, 21, CellKind::kNone},
-    {26, 4, CellKind::kNone},
-    {27, 5, CellKind::kNone},
-    {28, 6, CellKind::kNone},
-    {36, 16, CellKind::kNone},
-    {37, 25, CellKind::kNone},
-    {38, 36, CellKind::kNone},
-};
-
-bool isCurved(const Element& element) {
-  return element.order[1] != 0;
-}
-bool isOfHigherOrder(const Element& element) {
-  return !isCurved(element) && element.nodes > cornersOf(element.kind);
-}
-
-// ---- the source ----
 
 class GmshSource final : public ElementSource {
  public:
@@ -104,15 +38,11 @@ class GmshSource final : public ElementSource {
  private:
   /// A run of elements of one kind.
   struct Block {
-    const Element* element = nullptr;
+    const GmshElement* element = nullptr;
     uint64_t count = 0, nodes = 0;  // nodes: of the first one, in nodes_
   };
-  /// The header of a section of values, and where they begin.
-  struct Data {
-    std::string name;
-    Centring centring = Centring::kNode;
-    double time = 0;
-    uint64_t components = 1, count = 0, offset = 0;
+  struct Section {
+    uint64_t begin = 0, bytes = 0;  // 0: the file has none so far
   };
   struct Scalar {
     size_t field = 0;
@@ -127,14 +57,14 @@ class GmshSource final : public ElementSource {
   void appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const override;
   void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override;
   void readFormat();
-  void readNodes();
+  void readMesh(const std::string& section);
+  void readNodes(bool parametric);
   void readElements();
-  void readElement(const Element& element, uint64_t tag, NumberSpool<uint64_t>& nodes);
+  void readElement(const GmshElement& element, uint64_t tag, NumberSpool<uint64_t>& nodes);
   void flushNodes(NumberSpool<uint64_t>& nodes);
-  const Element& elementOf(int type) const;
-  void readDataHeader(Centring centring);
+  const GmshElement& elementOf(int type) const;
   void addFields(std::optional<uint32_t> time_step);
-  SpooledNumbers valuesOf(const std::vector<const Data*>& sections, uint64_t samples, const GmshTags& tags);
+  std::span<const uint64_t> nodesOf(uint64_t element);
 
   std::shared_ptr<SpoolFile> place_spool_, node_spool_, value_spool_, tag_spool_, element_tag_spool_;
   GmshReader reader_;
@@ -142,10 +72,12 @@ class GmshSource final : public ElementSource {
   GmshTags node_tags_, element_tags_;
   SpooledNumbers places_, nodes_;
   std::vector<Block> blocks_;
-  std::vector<uint64_t> pending_;  // tags of nodes
-  uint64_t cells_ = 0, left_out_ = 0;
-  bool has_nodes_ = false, has_elements_ = false;
-  std::vector<Data> data_;
+  std::vector<uint64_t> pending_, of_element_, before_;  // tags of nodes
+  uint64_t cells_ = 0, left_out_ = 0, repeated_ = 0;
+  Section node_section_, element_section_;
+  std::vector<GmshData> data_;
+  std::vector<uint64_t> ahead_;  // nodes of elements, for nodesOf()
+  PartOfList ahead_of_;          // whose they are; at: of the first one
   std::vector<Field> fields_;
   std::vector<Scalar> scalars_;  // [description_.scalars]
 };
@@ -160,30 +92,29 @@ GmshSource::GmshSource(const OpenGridOptions& options)
       node_tags_(tag_spool_, options.grid.string(), "nodes"),
       element_tags_(element_tag_spool_, options.grid.string(), "elements") {
   readFormat();
-  std::set<std::string> left_out;
   while (const auto section = reader_.line()) {
     if (!section->starts_with('$'))
       reader_.fail(fmt::format("has \"{}\" in the place of a section", printable(*section)));
     const std::string name = section->substr(1);
-    if (name == "Nodes")
-      readNodes();
-    else if (name == "Elements")
-      readElements();
-    else if (name == "NodeData" || name == "ElementData")
-      readDataHeader(name == "NodeData" ? Centring::kNode : Centring::kCell);
-    else if (name == "ElementNodeData" || name == "ParametricElements")
-      left_out.insert(name);
+    if (name == "Nodes" || name == "ParametricNodes" || name == "Elements") {
+      readMesh(name);
+      continue;
+    }
+    if (hasGmshData(name)) data_.push_back(readGmshData(reader_, name));
+    if (data_.size() > kMaxData) reader_.fail(fmt::format("has more than {} sections of values", kMaxData));
     reader_.skipTo("$End" + name);
   }
-  if (!has_nodes_ || !has_elements_)
-    reader_.fail(fmt::format("has no ${}", has_nodes_ ? "Elements" : "Nodes"));
+  if (node_section_.bytes == 0 || element_section_.bytes == 0)
+    reader_.fail(fmt::format("has no ${}", node_section_.bytes > 0 ? "Elements" : "Nodes"));
   if (cells_ == 0)
     throw Error("{}: has no elements with a volume; expected a mesh in three dimensions", reader_.name());
-  for (const std::string& name : left_out)
-    description_.warnings.push_back(fmt::format("left out: ${}", name));
   if (left_out_ > 0)
-    description_.warnings.push_back(fmt::format("{} of an order above 2 {} drawn by their corners",
-                                                countText(left_out_, "element"), isOrAre(left_out_)));
+    description_.warnings.push_back(
+        fmt::format("{} of an order above 2 {} drawn by their corners: pyramids, or without nodes inside",
+                    countText(left_out_, "element"), isOrAre(left_out_)));
+  if (repeated_ > 0)
+    description_.notes.push_back(fmt::format("{} repeated for further physical groups {} drawn once",
+                                             countText(repeated_, "element"), isOrAre(repeated_)));
   description_.files = {reader_.name()};
   description_.format =
       fmt::format("Gmsh {}, {}", version4_ ? "4.1" : "2.2", reader_.isBinary() ? "binary" : "ASCII");
@@ -213,8 +144,20 @@ void GmshSource::readFormat() {
   reader_.skipTo("$EndMeshFormat");
 }
 
-void GmshSource::readNodes() {
-  if (std::exchange(has_nodes_, true)) reader_.fail("has $Nodes twice");
+/// Reads nodes or elements. Gmsh appends views to a file with their mesh, which is passed over if it is the same again.
+void GmshSource::readMesh(const std::string& section) {
+  const bool elements = section == "Elements";
+  Section& known = elements ? element_section_ : node_section_;
+  const uint64_t begin = reader_.offset();
+  if (known.bytes == 0) elements ? readElements() : readNodes(section == "ParametricNodes");
+  reader_.skipTo("$End" + section);
+  const uint64_t bytes = reader_.offset() - begin;
+  if (known.bytes > 0 && (bytes != known.bytes || !reader_.isSame(begin, known.begin, bytes)))
+    throw Error("{}: has several meshes; expected one: save each to a file of its own", reader_.name());
+  if (known.bytes == 0) known = {begin, bytes};
+}
+
+void GmshSource::readNodes(bool parametric) {
   NumberSpool<double> places(place_spool_);
   const auto addPlace = [&](int parameters) {
     for (int axis = 0; axis < 3; ++axis) places.add(reader_.next<double>());
@@ -226,12 +169,12 @@ void GmshSource::readNodes() {
     for (uint64_t block = 0; block < blocks; ++block) {
       const auto dimension = reader_.next<int32_t>();
       reader_.next<int32_t>();
-      const auto parametric = reader_.next<int32_t>();
+      const bool has_parameters = reader_.next<int32_t>() != 0;
       if (dimension < 0 || dimension > 3)
         reader_.fail(fmt::format("has an entity of {} dimensions", dimension));
       const uint64_t count = reader_.nextCount(true);
       for (uint64_t n = 0; n < count; ++n) node_tags_.add(reader_.nextTag(true));
-      for (uint64_t n = 0; n < count; ++n) addPlace(parametric != 0 ? dimension : 0);
+      for (uint64_t n = 0; n < count; ++n) addPlace(has_parameters ? dimension : 0);
     }
   } else {
     const double count = reader_.textNumber();
@@ -241,23 +184,35 @@ void GmshSource::readNodes() {
     for (uint64_t n = 0; n < static_cast<uint64_t>(count); ++n) {
       node_tags_.add(reader_.nextTag(false));
       addPlace(0);
+      if (!parametric) continue;
+      const auto dimension = reader_.next<int32_t>();
+      reader_.next<int32_t>();
+      for (int k = 0; k < dimension && dimension < 3; ++k) reader_.next<double>();
     }
   }
   node_tags_.finish();
   places_ = places.finish();
 }
 
-const Element& GmshSource::elementOf(int type) const {
-  for (const Element& element : kElements)
-    if (element.type == type) return element;
+const GmshElement& GmshSource::elementOf(int type) const {
+  if (const GmshElement* const element = gmshElement(type)) return *element;
   throw Error("{}: has elements of type {}, which is not read; convert it (meshio convert FILE mesh.vtu)",
               reader_.name(), type);
 }
 
-/// Adds an element if it has a volume, and skips it otherwise.
-void GmshSource::readElement(const Element& element, uint64_t tag, NumberSpool<uint64_t>& nodes) {
+/// Adds an element with a volume, or passes over another one.
+void GmshSource::readElement(const GmshElement& element, uint64_t tag, NumberSpool<uint64_t>& nodes) {
   if (element.kind == CellKind::kNone) {
     for (size_t n = 0; n < element.nodes; ++n) reader_.nextTag(version4_);
+    return;
+  }
+  before_.swap(of_element_);
+  of_element_.clear();
+  for (size_t n = 0; n < element.nodes; ++n) of_element_.push_back(reader_.nextTag(version4_));
+  // Version 2 has an element once for each of its physical groups, one after another, each with a number of its own.
+  if (!version4_ && of_element_ == before_) {
+    ++repeated_;
+    element_tags_.addAnother(tag);
     return;
   }
   if (blocks_.empty() || blocks_.back().element != &element) {
@@ -270,10 +225,10 @@ void GmshSource::readElement(const Element& element, uint64_t tag, NumberSpool<u
   }
   ++blocks_.back().count;
   ++cells_;
-  left_out_ += isOfHigherOrder(element) ? 1 : 0;
-  has_curved_cells_ |= isCurved(element);
+  left_out_ += !element.isCurved() && element.nodes > cornersOf(element.kind) ? 1 : 0;
+  has_curved_cells_ |= element.isCurved();
   element_tags_.add(tag);
-  for (size_t n = 0; n < element.nodes; ++n) pending_.push_back(reader_.nextTag(version4_));
+  pending_.insert(pending_.end(), of_element_.begin(), of_element_.end());
   if (pending_.size() >= kAtOnce) flushNodes(nodes);
 }
 
@@ -284,8 +239,7 @@ void GmshSource::flushNodes(NumberSpool<uint64_t>& nodes) {
 }
 
 void GmshSource::readElements() {
-  if (!has_nodes_) reader_.fail("has $Elements before $Nodes");
-  if (std::exchange(has_elements_, true)) reader_.fail("has $Elements twice");
+  if (node_section_.bytes == 0) reader_.fail("has $Elements before $Nodes");
   NumberSpool<uint64_t> nodes(node_spool_);
   if (version4_) {
     const uint64_t blocks = reader_.nextCount(true);
@@ -293,7 +247,7 @@ void GmshSource::readElements() {
     for (uint64_t block = 0; block < blocks; ++block) {
       reader_.next<int32_t>();
       reader_.next<int32_t>();
-      const Element& element = elementOf(reader_.next<int32_t>());
+      const GmshElement& element = elementOf(reader_.next<int32_t>());
       const uint64_t count = reader_.nextCount(true);
       for (uint64_t n = 0; n < count; ++n) readElement(element, reader_.nextTag(true), nodes);
     }
@@ -305,7 +259,7 @@ void GmshSource::readElements() {
     for (uint64_t n = 0; n < static_cast<uint64_t>(count);) {
       // In binary elements of one kind follow their header; in text each one has its own.
       uint64_t tag = reader_.isBinary() ? 0 : reader_.nextTag(false);
-      const Element& element = elementOf(reader_.next<int32_t>());
+      const GmshElement& element = elementOf(reader_.next<int32_t>());
       const uint64_t some = reader_.isBinary() ? reader_.nextCount(false) : 1;
       const uint64_t tags = reader_.nextCount(false);
       if (some == 0) reader_.fail("has a list of no elements");
@@ -321,51 +275,18 @@ void GmshSource::readElements() {
   element_tags_.finish();
 }
 
-/// Reads the header of a section of values: its names, real numbers and integers, which are always text.
-void GmshSource::readDataHeader(Centring centring) {
-  Data data;
-  data.centring = centring;
-  const auto countOf = [&](const char* what) {
-    const double count = reader_.textNumber();
-    if (!(count >= 0 && count <= 1000)) reader_.fail(fmt::format("counts {} {}", count, what));
-    return static_cast<size_t>(count);
-  };
-  for (size_t n = countOf("names"); n > 0; --n) {
-    const std::string words = reader_.requiredLine();
-    if (data.name.empty()) data.name = words;
-  }
-  std::erase(data.name, '"');
-  const size_t reals = countOf("times");
-  for (size_t n = 0; n < reals; ++n)
-    if (const double real = reader_.textNumber(); n == 0) data.time = real;
-  const size_t integers = countOf("sizes");
-  std::vector<double> sizes(std::max<size_t>(3, integers));
-  for (size_t n = 0; n < integers; ++n) sizes[n] = reader_.textNumber();
-  if (integers < 3 || !(sizes[1] >= 1 && sizes[1] <= 9) ||
-      !(sizes[2] >= 0 && sizes[2] <= static_cast<double>(reader_.size())))
-    reader_.fail(fmt::format("has values of {} components for {} samples", sizes[1], sizes[2]));
-  reader_.endLine();
-  data.components = static_cast<uint64_t>(sizes[1]);
-  data.count = static_cast<uint64_t>(sizes[2]);
-  data.offset = reader_.offset();
-  if (reader_.isBinary() &&
-      data.count * (4 + 8 * data.components) > reader_.size() - std::min(reader_.size(), data.offset))
-    reader_.fail("ends within values");
-  if (reader_.isBinary()) reader_.seek(data.offset + data.count * (4 + 8 * data.components));
-  if (data.name.empty()) data.name = centring == Centring::kNode ? "NodeData" : "ElementData";
-  if (data_.size() == kMaxData) reader_.fail(fmt::format("has more than {} sections of values", kMaxData));
-  data_.push_back(std::move(data));
-}
-
 void GmshSource::addFields(std::optional<uint32_t> time_step) {
+  // Some programs number the steps alone.
+  const bool has_times = std::any_of(data_.begin(), data_.end(),
+                                     [&](const GmshData& data) { return data.time != data_.front().time; });
   std::set<double> times;
-  for (const Data& data : data_) times.insert(data.time);
+  for (GmshData& data : data_) times.insert(data.time = has_times ? data.time : data.step);
   if (times.size() > 1) description_.times.assign(times.begin(), times.end());
   description_.time_step = chosenTimeStep(reader_.name(), description_.times, time_step);
   const double time = times.size() > 1 ? description_.times[description_.time_step] : 0;
-  std::map<std::pair<std::string, Centring>, std::vector<const Data*>> of_name;
+  std::map<std::pair<std::string, Centring>, std::vector<const GmshData*>> of_name;
   std::vector<std::pair<std::string, Centring>> names;
-  for (const Data& data : data_) {
+  for (const GmshData& data : data_) {
     if (times.size() > 1 && data.time != time) continue;
     auto& sections = of_name[{data.name, data.centring}];
     if (sections.empty()) names.emplace_back(data.name, data.centring);
@@ -374,50 +295,35 @@ void GmshSource::addFields(std::optional<uint32_t> time_step) {
                   sections.front()->components, data.components);
     sections.push_back(&data);
   }
+  const GmshSamples samples{value_spool_, node_tags_, element_tags_,
+                            [&](uint64_t element) { return nodesOf(element); }};
   ScalarList list(description_);
   for (const auto& name : names) {
     const auto& sections = of_name[name];
-    const bool nodes = name.second == Centring::kNode;
     const uint64_t components = sections.front()->components;
     size_t number = 0;
     forEachComponent(components, [&](const std::string& suffix, int component) {
       list.add(namesOfComponent(name.first, suffix, name.second, ++number), name.second);
       scalars_.push_back({fields_.size(), component});
     });
-    fields_.push_back(
-        {valuesOf(sections, nodes ? node_tags_.count() : cells_, nodes ? node_tags_ : element_tags_),
-         components});
+    fields_.push_back({spooledGmshData(reader_, sections, samples), components});
   }
 }
 
-/// Spools the values of all samples, in their order; NaN for samples that the sections leave out.
-SpooledNumbers GmshSource::valuesOf(const std::vector<const Data*>& sections, uint64_t samples,
-                                    const GmshTags& tags) {
-  const uint64_t components = sections.front()->components;
-  NumberSpool<double> spool(value_spool_);
-  std::vector<double> part, some;
-  std::vector<uint64_t> numbers;
-  for (uint64_t begin = 0; begin < samples; begin += kSamplesAtOnce) {
-    const uint64_t count = std::min(kSamplesAtOnce, samples - begin);
-    part.assign(count * components, kNaN);
-    for (const Data* data : sections) {
-      reader_.seek(data->offset);
-      for (uint64_t n = 0; n < data->count; n += numbers.size()) {
-        numbers.resize(std::min(kAtOnce, data->count - n));
-        some.resize(numbers.size() * components);
-        for (size_t k = 0; k < numbers.size(); ++k) {
-          numbers[k] = reader_.nextTag(false);
-          for (uint64_t c = 0; c < components; ++c) some[k * components + c] = reader_.next<double>();
-        }
-        tags.replace(numbers);
-        for (size_t k = 0; k < numbers.size(); ++k)
-          if (numbers[k] >= begin && numbers[k] - begin < count)
-            std::copy_n(&some[k * components], components, &part[(numbers[k] - begin) * components]);
-      }
-    }
-    for (const double value : part) spool.add(value);
-  }
-  return spool.finish();
+/// The nodes of an element, in the order of the file; the result is valid until the next call. For one thread.
+std::span<const uint64_t> GmshSource::nodesOf(uint64_t element) {
+  if (element < ahead_of_.at || element - ahead_of_.at >= ahead_of_.count)
+    forEachPartOfLists(
+        blocks_, element, 1, [](const Block& block) { return block.count; },
+        [&](const PartOfList& part) {
+          const Block& block = blocks_[part.list];
+          const uint64_t count = std::min(kAtOnce / block.element->nodes, block.count - part.first);
+          ahead_of_ = {part.list, part.first, count, element};
+          ahead_.resize(count * block.element->nodes);
+          nodes_.read(block.nodes + part.first * block.element->nodes, std::span(ahead_));
+        });
+  const size_t nodes = blocks_[ahead_of_.list].element->nodes;
+  return std::span<const uint64_t>(ahead_).subspan((element - ahead_of_.at) * nodes, nodes);
 }
 
 void GmshSource::readPlaces(uint32_t, uint64_t first, uint64_t count, const Places& to) const {
@@ -427,22 +333,22 @@ void GmshSource::readPlaces(uint32_t, uint64_t first, uint64_t count, const Plac
 }
 
 void GmshSource::appendCells(uint32_t, uint64_t first, uint64_t count, MeshCells& out) const {
-  std::vector<uint64_t> nodes;
-  std::array<uint64_t, 27> turned{};
+  std::vector<uint64_t> nodes, turned;
   forEachPartOfLists(
       blocks_, first, count, [](const Block& block) { return block.count; },
       [&](const PartOfList& part) {
-        const Element& element = *blocks_[part.list].element;
+        const GmshElement& element = *blocks_[part.list].element;
         nodes.resize(part.count * element.nodes);
         nodes_.read(blocks_[part.list].nodes + part.first * element.nodes, std::span(nodes));
         for (uint64_t n = 0; n < part.count; ++n) {
           const auto of_cell = std::span<const uint64_t>(nodes).subspan(n * element.nodes, element.nodes);
-          if (!isCurved(element)) {
+          if (!element.isCurved()) {
             out.append(element.kind, of_cell.first(cornersOf(element.kind)));
             continue;
           }
-          for (size_t k = 0; k < element.nodes; ++k) turned[k] = of_cell[element.order[k]];
-          appendCurved(element.kind, std::span(turned).first(element.nodes), out);
+          turned.clear();
+          for (const uint16_t node : element.order) turned.push_back(of_cell[node]);
+          appendCurved(element.kind, turned, out);
         }
       });
 }

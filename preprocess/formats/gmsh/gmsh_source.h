@@ -1,5 +1,5 @@
-// Reads meshes of Gmsh (.msh), versions 4.1 and 2.2, in text or binary, with the time steps of values at
-// nodes ($NodeData) and in elements ($ElementData).
+// Meshes of Gmsh (.msh), versions 4.1 and 2.2, in text or binary, with values at nodes ($NodeData), in elements ($ElementData) and
+// at the nodes of each element ($ElementNodeData), of several steps.
 #pragma once
 
 #include <memory>
@@ -12,9 +12,8 @@ namespace curvisplat {
 /// Whether the file begins with $MeshFormat.
 bool isGmsh(const InputFile& file);
 
-/// Reads the mesh and spools it: positions, nodes of the elements, values of the time step, 8 bytes for each
-/// number. Elements without a volume are left out. Elements of second order are curved; those of higher
-/// orders are drawn by their corners, with a warning. Throws Error.
+/// Reads the mesh and spools it: positions, nodes of the elements, values of the time step, 8 bytes each. Elements without a volume are
+/// left out. Those of higher order are curved (gmsh_elements.h). Throws Error.
 std::unique_ptr<DataSource> openGmsh(const OpenGridOptions& options);
 
 }  // namespace curvisplat

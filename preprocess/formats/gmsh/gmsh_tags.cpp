@@ -23,11 +23,15 @@ void GmshTags::finish() {
   std::vector<uint64_t> part, some;
   for (uint64_t begin = first_; begin <= last_; begin += kTableAtOnce) {
     part.assign(std::min(kTableAtOnce, last_ - begin + 1), kNowhere);
-    for (uint64_t n = 0; n < count_; n += some.size()) {
-      some.resize(std::min(kAtOnce, count_ - n));
+    uint64_t next = 0;
+    for (uint64_t n = 0; n < tags.count; n += some.size()) {
+      some.resize(std::min(kAtOnce, tags.count - n));
       tags.read(n, std::span(some));
-      for (size_t k = 0; k < some.size(); ++k)
-        if (some[k] >= begin && some[k] - begin < part.size()) part[some[k] - begin] = n + k;
+      for (const uint64_t stored : some) {
+        next += (stored & kAnother) == 0 ? 1 : 0;
+        const uint64_t tag = stored & ~kAnother;
+        if (tag >= begin && tag - begin < part.size()) part[tag - begin] = next - 1;
+      }
     }
     for (const uint64_t index : part) table.add(index);
   }

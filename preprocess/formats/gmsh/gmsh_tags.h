@@ -27,6 +27,13 @@ class GmshTags {
     ++count_;
     tags_.add(tag);
   }
+  /// A further number of the last one that was added.
+  void addAnother(uint64_t tag) {
+    in_order_ = false;
+    first_ = std::min(first_, tag);
+    last_ = std::max(last_, tag);
+    tags_.add(tag | kAnother);
+  }
   uint64_t count() const { return count_; }
 
   /// Ends the additions, and makes the table. Throws Error if the tags are too far apart for one.
@@ -38,8 +45,10 @@ class GmshTags {
   static constexpr uint64_t kNowhere = std::numeric_limits<uint64_t>::max();
 
  private:
+  static constexpr uint64_t kAnother = uint64_t{1} << 63;
+
   std::shared_ptr<SpoolFile> spool_;
-  NumberSpool<uint64_t> tags_;
+  NumberSpool<uint64_t> tags_;  // in the order of the file; kAnother: of the same index as the one before
   SpooledNumbers table_;
   std::string file_;
   const char* what_;
