@@ -174,6 +174,51 @@ class XdmfMeshes(MeshFormats):
         info = self.info(self.write(self.grid(mesh, ("Hexahedron_20", 1, np.arange(20)[None]))))
         self.assertEqual(info["cells"]["count"], 9)
 
+    def function(self, name, degree, family, per_cell, kind="Scalar"):
+        """A function as FEniCS's write_checkpoint writes it. per_cell: [cell, component, degree of freedom]; equal values of a continuous
+        function are stored once."""
+        values, numbers = np.unique(per_cell.ravel(), return_inverse=True) if family == "CG" else (per_cell.ravel(), np.arange(per_cell.size))
+        order = self.RANDOM.permutation(len(values))  # where each value is stored
+        stored = np.empty(len(values))
+        stored[order] = values
+        cells = len(per_cell)
+        items = (order[numbers].reshape(-1, 1), stored.reshape(-1, 1), np.arange(cells + 1).reshape(-1, 1) * per_cell[0].size, np.arange(cells).reshape(-1, 1))
+        return (f'<Attribute ItemType="FiniteElementFunction" ElementFamily="{family}" ElementDegree="{degree}" ElementCell="tetrahedron" Name="{name}" '
+                f'Center="Other" AttributeType="{kind}">{"".join(map(self.item, items))}</Attribute>')
+
+    def test_functions_of_finite_elements(self):
+        mesh = Mesh(3, (4,))
+        cells = np.array(mesh.cells)
+        self.assertEqual(cells.shape[1], 4)
+        grid = self.grid(mesh, ("Tetrahedron", len(cells), cells))
+        bare = grid[:grid.index("<Attribute")]
+        at_corners, edges = mesh.p[cells][:, None, :], self.RANDOM.random((len(cells), 1, 6))
+        for degree, family, values in ((1, "CG", at_corners), (1, "DG", at_corners), (2, "DG", np.concatenate([at_corners, edges], 2))):
+            with self.subTest(degree=degree, family=family):
+                functions = self.function("p", degree, family, values) + self.function("c", 0, "DG", mesh.c[:, None, None])
+                self.expect_same([self.write(bare + functions + "</Grid>")], mesh.vtk())
+        vector = self.RANDOM.random((len(mesh.points), 3))
+        self.write(bare + self.function("v", 1, "CG", vector[cells].swapaxes(1, 2), "Vector") + "</Grid>")
+        info = {scalar["name"]: scalar for scalar in self.info(self.path)["scalars"]}
+        for axis, name in enumerate("xyz"):
+            self.assertEqual(info[f"v:{name}"]["max"], np.float32(vector[:, axis].max()))
+        # Where cells differ, the mean.
+        jumps = self.RANDOM.random((len(cells), 1, 4))
+        sums, counts = np.zeros(len(mesh.points)), np.zeros(len(mesh.points))
+        np.add.at(sums, cells, jumps[:, 0])
+        np.add.at(counts, cells, 1)
+        info = self.info(self.write(bare + self.function("j", 1, "DG", jumps) + "</Grid>"))["scalars"][0]
+        self.assertAlmostEqual(info["max"], (sums / counts).max(), places=6)
+        self.assertAlmostEqual(info["min"], (sums / counts).min(), places=6)
+        for family, degree in (("RT", 1), ("CG", 3)):
+            info = self.info(self.write(bare + self.function("q", degree, family, at_corners) + "</Grid>"))
+            self.assertIn(f"attribute q is a function of finite elements ({family} of degree {degree})", info["warnings"][0])
+        self.expect_line(self.write(bare + self.function("q", 2, "CG", at_corners) + "</Grid>"), words="expected 10 in each")
+        text = bare + self.function("p", 1, "CG", at_corners) + "</Grid>"
+        with h5py.File(self.folder / "a.h5", "a") as f:
+            f[str(self.count - 3)][5] = 10**6
+        self.expect_line(self.write(text), scalar="p", words="has the degree of freedom 1000000")
+
     def test_what_is_refused(self):
         mesh = Mesh(2, (8,))
         name, elements, numbers = self.mixed(mesh)

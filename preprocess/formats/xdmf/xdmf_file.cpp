@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
 #include <set>
 
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/xdmf/xdmf_document.h"
+#include "preprocess/formats/xdmf/xdmf_function.h"
 #include "preprocess/formats/xdmf/xdmf_items.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
@@ -22,44 +22,13 @@ constexpr uint64_t kLooked = 2048;
 // The words that a cell of a Mixed topology may have: a polyhedron's.
 constexpr uint64_t kMaxWords = 100'000;
 
-constexpr XdmfCellType kCellTypes[] = {{"polyvertex", 1, CellKind::kNone, 0, true},
-                                       {"polyline", 2, CellKind::kNone, 0, true},
-                                       {"polygon", 3, CellKind::kNone, 0, true},
-                                       {"triangle", 4, CellKind::kNone, 3},
-                                       {"quadrilateral", 5, CellKind::kNone, 4},
-                                       {"tetrahedron", 6, CellKind::kTetrahedron, 4},
-                                       {"pyramid", 7, CellKind::kPyramid, 5},
-                                       {"wedge", 8, CellKind::kWedge, 6},
-                                       {"hexahedron", 9, CellKind::kHexahedron, 8},
-                                       {"polyhedron", 16, CellKind::kPolyhedron, 0, true},
-                                       {"edge_3", 34, CellKind::kNone, 3},
-                                       {"quadrilateral_9", 35, CellKind::kNone, 9},
-                                       {"triangle_6", 36, CellKind::kNone, 6},
-                                       {"quadrilateral_8", 37, CellKind::kNone, 8},
-                                       {"tetrahedron_10", 38, CellKind::kTetrahedron, 10},
-                                       {"pyramid_13", 39, CellKind::kPyramid, 13},
-                                       {"wedge_15", 40, CellKind::kWedge, 15},
-                                       {"wedge_18", 41, CellKind::kWedge, 18},
-                                       {"hexahedron_20", 48, CellKind::kHexahedron, 20},
-                                       {"hexahedron_24", 49, CellKind::kHexahedron, 24},
-                                       {"hexahedron_27", 50, CellKind::kHexahedron, 27}};
-
-/// The type that a topology names; short forms (Tet_10, Hex_20) are known, too.
-const XdmfCellType* typeNamed(std::string name) {
-  for (const auto& [brief, full] : {std::pair("tet_", "tetrahedron_"), std::pair("hex_", "hexahedron_"),
-                                    std::pair("tri_", "triangle_"), std::pair("quad_", "quadrilateral_")})
-    if (name.starts_with(brief)) name = full + name.substr(std::string_view(brief).size());
-  const auto found = std::find_if(std::begin(kCellTypes), std::end(kCellTypes),
-                                  [&](const XdmfCellType& type) { return name == type.name; });
-  return found == std::end(kCellTypes) ? nullptr : found;
-}
-
 class Reader {
  public:
   explicit Reader(const OpenGridOptions& options)
       : document_(options.grid),
         items_(document_, options.namesFolder()),
-        begins_(std::make_shared<SpoolFile>(options.temporary_folder)) {
+        begins_(std::make_shared<SpoolFile>(options.temporary_folder)),
+        values_(std::make_shared<SpoolFile>(options.temporary_folder)) {
     for (const pugi::xml_node grid : document_.domain().children("Grid")) findLeaves(grid, std::nullopt, 0);
     if (leaves_.empty()) throw Error("{}: has no Grid", name());
     chooseStep(options);
@@ -189,7 +158,7 @@ class Reader {
     for (const Leaf& leaf : leaves_) {
       const pugi::xml_node topology = document_.resolved(leaf.node.child("Topology"));
       const XdmfCellType* const type =
-          typeNamed(lowerCase(xdmfAttribute(topology, {"TopologyType", "Type"})));
+          xdmfCellTypeNamed(lowerCase(xdmfAttribute(topology, {"TopologyType", "Type"})));
       if (!leaf.node.child("Attribute") || (type && type->shape == CellKind::kNone)) continue;
       drawn.insert(topology);
       drawn.insert(document_.resolved(leaf.node.child("Geometry")));
@@ -213,12 +182,12 @@ class Reader {
                   document_.describe(node));
     const std::string type = xdmfAttribute(topology, {"TopologyType", "Type"}), small = lowerCase(type);
     if (!small.ends_with("smesh") && !small.ends_with("rectmesh")) {
-      if (small != "mixed" && !typeNamed(small))
+      if (small != "mixed" && !xdmfCellTypeNamed(small))
         throw Error(
             "{} has the topology {}, which is not read; expected 3DSMesh, 3DRectMesh, 3DCoRectMesh, Mixed, "
             "Tetrahedron, Hexahedron or the like",
             document_.describe(node), printable(type.substr(0, 40)));
-      readMesh(node, topology, typeNamed(small), grid);
+      readMesh(node, topology, xdmfCellTypeNamed(small), grid);
       return grid;
     }
     const std::vector<uint64_t> counts =
@@ -388,11 +357,45 @@ class Reader {
     }
   }
 
+  static std::string degreeOf(const pugi::xml_node& function) {
+    return xdmfAttribute(function, {"ElementDegree"});
+  }
+
+  /// The values of a function of finite elements; null, with a warning, if it is of a kind that is not read.
+  std::shared_ptr<const XdmfValues> readFunction(const pugi::xml_node& node, const std::string& name,
+                                                 const XdmfGrid& grid) {
+    const std::string family = xdmfAttribute(node, {"ElementFamily"}), degree = degreeOf(node);
+    const bool known =
+        (family == "CG" || family == "DG") && (degree == "0" || degree == "1" || degree == "2");
+    const bool linear = grid.cells.shape == CellKind::kTetrahedron && grid.cells.nodes_each == 4;
+    std::vector<std::shared_ptr<const XdmfValues>> items;
+    for (const pugi::xml_node item : node.children("DataItem"))
+      if (items.size() < 2) items.push_back(items_.read(item));
+    if (!known || !linear || items.size() < 2) {
+      warn(
+          fmt::format("attribute {} is a function of finite elements ({} of degree {}), which is read in "
+                      "linear tetrahedra, for CG and DG "
+                      "of degree 0 to 2; it is left out",
+                      name, printable(family.substr(0, 40)), printable(degree.substr(0, 40))));
+      return nullptr;
+    }
+    if (degree == "2") warn(fmt::format("attribute {} is of degree 2; its values at corners are read", name));
+    return xdmfFunctionValues(
+        {grid.nodes[0], grid.cells.count, grid.cells.connectivity, grid.cells.first_point, items[0], items[1],
+         static_cast<uint64_t>(degree[0] - '0'), family == "CG", document_.describe(node)},
+        values_);
+  }
+
   void readAttribute(const pugi::xml_node& node, XdmfGrid& grid) {
     XdmfAttribute attribute;
     attribute.name = xdmfAttribute(node, {"Name"});
     if (attribute.name.empty()) attribute.name = fmt::format("attribute {}", grid.attributes.size() + 1);
-    const std::string centre = lowerCase(xdmfAttribute(node, {"Center"}));
+    std::string centre = lowerCase(xdmfAttribute(node, {"Center"}));
+    if (xdmfAttribute(node, {"ItemType"}) == "FiniteElementFunction") {
+      attribute.values = readFunction(node, attribute.name, grid);
+      if (!attribute.values) return;
+      centre = degreeOf(node) == "0" ? "cell" : "node";
+    }
     if (!centre.empty() && centre != "node" && centre != "cell") {
       warn(fmt::format("attribute {} belongs to each {}; it is left out", attribute.name, centre));
       return;
@@ -401,7 +404,7 @@ class Reader {
     const pugi::xml_node item = node.child("DataItem");
     if (!item) throw Error("{} has no DataItem", document_.describe(node));
     try {
-      attribute.values = items_.read(item);
+      if (!attribute.values) attribute.values = items_.read(item);
     } catch (const XdmfComputedItem& error) {
       warn(fmt::format("attribute {} is left out: {}", attribute.name, error.what()));
       return;
@@ -431,6 +434,7 @@ class Reader {
   XdmfDocument document_;
   XdmfItems items_;
   const std::shared_ptr<SpoolFile> begins_;  // of the cells of all grids
+  const std::shared_ptr<SpoolFile> values_;  // of functions of finite elements
   std::map<pugi::xml_node, Times> times_;    // of temporal collections
   std::vector<Leaf> leaves_;
   std::set<std::pair<std::string, Centring>> attributes_of_grid_;
@@ -440,12 +444,6 @@ class Reader {
 };
 
 }  // namespace
-
-const XdmfCellType* xdmfCellType(uint64_t number) {
-  const auto found = std::find_if(std::begin(kCellTypes), std::end(kCellTypes),
-                                  [&](const XdmfCellType& type) { return number == type.number; });
-  return found == std::end(kCellTypes) ? nullptr : found;
-}
 
 bool isXdmf(const InputFile& file) {
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');

@@ -19,6 +19,7 @@
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/common/spool_file.h"
+#include "preprocess/formats/xdmf/xdmf_cell_types.h"
 #include "preprocess/formats/xdmf/xdmf_values.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_source.h"
@@ -61,18 +62,6 @@ struct XdmfFile {
   uint32_t time_step = 0;
   std::vector<std::string> files, warnings;
 };
-
-/// The meaning of a type of a Mixed topology. `counted`: of polygons and the like the number of points comes
-/// before them, of polyhedra that of faces, and before each face that of its points.
-struct XdmfCellType {
-  const char* name;  // of a topology of this type alone, in lower case
-  uint64_t number;
-  CellKind shape;
-  uint64_t nodes;
-  bool counted = false;
-};
-/// Null if there is no such type.
-const XdmfCellType* xdmfCellType(uint64_t number);
 
 /// Whether the file is XML with the element Xdmf.
 bool isXdmf(const InputFile& file);
