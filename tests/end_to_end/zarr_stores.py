@@ -47,7 +47,11 @@ def shuffled(data, item):
 
 
 def encode(data, codec, item):
-    return {None: lambda: data, "zlib": lambda: zlib.compress(data), "gzip": lambda: gzip.compress(data), "zstd": lambda: zstd(data),
+    numbers = lambda: np.frombuffer(data, f"<i{item}")
+    return {"bitround": lambda: data, "quantize": lambda: data, "delta": lambda: np.diff(numbers(), prepend=numbers().dtype.type(0)).tobytes(),
+            "fixedscaleoffset": lambda: ((numbers() - 5.0) * 2).astype("<i4").tobytes(),
+            "crc32": lambda: struct.pack("<I", zlib.crc32(data)) + data, "adler32": lambda: struct.pack("<I", zlib.adler32(data)) + data,
+            None: lambda: data, "zlib": lambda: zlib.compress(data), "gzip": lambda: gzip.compress(data), "zstd": lambda: zstd(data),
             "lz4": lambda: lz4(data), "blosc": lambda: blosc(data, item), "blosc-zstd": lambda: blosc(data, item, "zstd", 2),
             "shuffle": lambda: shuffled(data, item), "crc32c": lambda: crc32c(data)}[codec]()
 
@@ -55,6 +59,10 @@ def encode(data, codec, item):
 def configuration(codec, item):
     if codec.startswith("blosc"):
         return {"cname": codec[6:] or "lz4", "clevel": 5, "shuffle": "shuffle", "typesize": item, "blocksize": 0}
+    filters = {"bitround": {"keepbits": 10}, "quantize": {"digits": 3, "dtype": f"<f{item}"}, "delta": {"dtype": f"<i{item}"},
+               "fixedscaleoffset": {"scale": 2, "offset": 5, "dtype": f"<i{item}", "astype": "<i4"}}
+    if codec in filters:
+        return filters[codec]
     return {"elementsize": item} if codec == "shuffle" else {"level": 1} if codec in ("gzip", "zstd") else {}
 
 

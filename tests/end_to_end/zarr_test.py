@@ -123,6 +123,18 @@ class ZarrStores(ModelFileTest):
             with self.subTest(options):
                 self.expect_same(f"v3_{n}.zarr")
 
+    def test_filters(self):
+        for n, (of_temp, of_packed) in enumerate(((("bitround", "zlib"), ("delta", "adler32", "zlib")), (("quantize", "zlib"), ("fixedscaleoffset", "crc32", "zstd")))):
+            self.store(2, f"f{n}.zarr", dict(codecs=of_temp, fill="NaN"), of_packed=dict(fill=-32768, chunks=(3, 6, 8), codecs=of_packed))
+            self.expect_same(f"f{n}.zarr")
+
+    def test_groups(self):
+        self.store(2, "g.zarr/run", of_packed=dict(fill=-32768)).write("../.zgroup", json.dumps({"zarr_format": 2}))
+        line = self.info("g.zarr", fails=True)
+        self.assertIn("its arrays are in groups (run), each of which is a store: give the folder of one (", line)
+        self.assertIn("g.zarr/run)", line)
+        self.assertEqual(self.measured("g.zarr/run"), self.measured("file.nc"))
+
     def test_archives(self):
         for version in (2, 3):
             self.store(version, "z.zarr", of_packed=dict({2: "fill", 3: "_FillValue"}[version] and
@@ -263,6 +275,8 @@ class ZarrStores(ModelFileTest):
         for version, change, words in (
                 (2, self.edit("temp/.zarray", compressor={"id": "bz2"}), "is stored with the codec 'bz2', which is not read; write it with zlib"),
                 (2, self.edit("temp/.zarray", filters=[{"id": "delta"}]), "codec 'delta'"),
+                (2, self.edit("temp/.zarray", filters=[{"id": "delta", "dtype": "<f8"}]), "codec 'delta'"),
+                (2, self.edit("temp/.zarray", filters=[{"id": "crc32"}]), "has a wrong checksum"),
                 (2, self.edit("temp/.zarray", chunks=[3, 900, 1700, 2300]), "has chunks of 40272 MiB"),
                 (2, self.edit("temp/.zarray", shape=[3, 9, 17, 10**12], chunks=[1, 1, 1, 10]), "next to no chunks"),
                 (2, self.edit("temp/.zarray", chunks=[3]), "has 4 axes, but chunks of 1"),

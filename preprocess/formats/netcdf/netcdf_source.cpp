@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <set>
 #include <tuple>
@@ -136,11 +137,14 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
                                    : "structured grids are read, and UGRID, ICON and MPAS in files that have "
                                      "their faces and nodes");
     std::string why = nearestToGrid(file);
-    if (!file.groups().empty())
+    if (!file.groups().empty() && std::filesystem::is_directory(file.path()))
+      why =
+          fmt::format("its arrays are in groups ({}), each of which is a store: give the folder of one ({})",
+                      listed(file.groups()), (file.path() / file.groups().front()).string());
+    else if (!file.groups().empty())
       why = fmt::format(
           "its variables are in groups ({}), which are not read: write a group to a file of its own (ncks -G "
-          ": "
-          "-g {} {} OUT)",
+          ": -g {} {} OUT)",
           listed(file.groups()), file.groups().front(), file.path().filename().string());
     if (!found.left_out.empty()) {
       const auto reasons = byReason(found.left_out);

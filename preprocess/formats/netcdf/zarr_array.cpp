@@ -116,7 +116,7 @@ constexpr NamedNumber kNumbers[] = {
 void setNumber(ZarrArray& array, std::string_view name, std::string_view NamedNumber::*names) {
   for (const NamedNumber& one : kNumbers)
     if (one.*names == name) {
-      array.number = one.number;
+      array.number = array.declared = one.number;
       array.value_bytes = one.bytes;
     }
 }
@@ -180,25 +180,60 @@ std::optional<double> fillOf(const ZarrArray& array, const JsonField& metadata) 
 
 // ---- codecs ----
 
+/// The number that NumPy calls `name` ("<i2"), in little-endian; null if it is another.
+const NamedNumber* littleEndian(const std::string& name) {
+  const auto* const found =
+      std::find_if(std::begin(kNumbers), std::end(kNumbers), [&](const NamedNumber& one) {
+        return name == one.version2 || name == fmt::format("<{}", one.version2) ||
+               (one.bytes == 1 && name == fmt::format("|{}", one.version2));
+      });
+  return found == std::end(kNumbers) || found->number == ZarrNumber::kHalf ? nullptr : found;
+}
+
+/// Adds a filter of numbers; false if it is not read. Rounded numbers are stored as they are.
+bool addFilter(ZarrArray& array, std::string_view name, const JsonField& filter) {
+  if (name == "bitround") return true;
+  if (!filter.has("dtype") || array.big_endian) return false;
+  const NamedNumber* const values = littleEndian(filter.at("dtype").text());
+  const NamedNumber* const stored = filter.has("astype") ? littleEndian(filter.at("astype").text()) : values;
+  if (!values || !stored || values->number != array.number) return false;
+  if (name == "quantize") return stored == values;
+  if (name == "delta" && stored == values) {
+    array.codecs.push_back({ZarrCodec::Kind::kDelta, stored->bytes, stored->number});
+    return true;
+  }
+  if (name != "fixedscaleoffset" || !array.codecs.empty()) return false;
+  array.scale = filter.at("scale").number();
+  array.offset = filter.at("offset").number();
+  array.number = stored->number;
+  array.value_bytes = stored->bytes;
+  return array.scale != 0;
+}
+
 /// Adds a codec by its name in either version; false if it is not read.
 bool addCodec(ZarrArray& array, std::string_view name, const std::optional<JsonField>& configuration) {
   using Kind = ZarrCodec::Kind;
   if (name.starts_with("numcodecs.")) name.remove_prefix(std::string_view("numcodecs.").size());
   constexpr std::pair<std::string_view, Kind> kKinds[] = {
-      {"gzip", Kind::kZlib}, {"zlib", Kind::kZlib},       {"zstd", Kind::kZstd},      {"blosc", Kind::kBlosc},
-      {"lz4", Kind::kLz4},   {"shuffle", Kind::kShuffle}, {"crc32c", Kind::kChecksum}};
+      {"gzip", Kind::kZlib},       {"zlib", Kind::kZlib},   {"zstd", Kind::kZstd},
+      {"blosc", Kind::kBlosc},     {"lz4", Kind::kLz4},     {"shuffle", Kind::kShuffle},
+      {"crc32c", Kind::kChecksum}, {"crc32", Kind::kCrc32}, {"adler32", Kind::kAdler32}};
   for (const auto& [known, kind] : kKinds) {
     if (known != name) continue;
+    const bool at_end = kind == Kind::kChecksum;
+    if (configuration && configuration->has("location") &&
+        (configuration->at("location").text() == "end") != at_end)
+      return false;
     size_t bytes = 0;
     if (kind == Kind::kShuffle) {
       const char* const key =
           configuration && configuration->has("elementsize") ? "elementsize" : "element_size";
       bytes = configuration && configuration->has(key) ? configuration->at(key).count(1, 256) : 4;
     }
-    array.codecs.push_back({kind, bytes});
+    array.codecs.push_back({kind, bytes, ZarrNumber::kNone});
     return true;
   }
-  return false;
+  return configuration && addFilter(array, name, *configuration);
 }
 
 void refuse(ZarrArray& array, std::string reason) {
@@ -337,7 +372,7 @@ int ZarrArray::type() const {
   if (text == Text::kBytes) return NC_CHAR;
   if (text != Text::kNone) return NC_STRING;
   for (const NamedNumber& one : kNumbers)
-    if (one.number == number) return one.type;
+    if (one.number == declared) return one.type;
   return NC_NAT;
 }
 

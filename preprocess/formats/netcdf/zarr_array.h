@@ -37,8 +37,19 @@ enum class ZarrNumber {
 
 /// One of the steps that turn the bytes of a chunk's values into those of its file.
 struct ZarrCodec {
-  enum class Kind { kZlib, kZstd, kBlosc, kLz4, kShuffle, kChecksum } kind;  // kZlib: also gzip
-  size_t element_bytes = 0;                                                  // for kShuffle
+  enum class Kind {
+    kZlib,
+    kZstd,
+    kBlosc,
+    kLz4,
+    kShuffle,
+    kDelta,
+    kChecksum,
+    kCrc32,
+    kAdler32
+  } kind;                                 // kZlib: gzip, too
+  size_t element_bytes = 0;               // of kShuffle
+  ZarrNumber number = ZarrNumber::kNone;  // of kDelta
 };
 
 struct ZarrArray {
@@ -47,8 +58,9 @@ struct ZarrArray {
   std::vector<uint64_t> shape, chunks;  // [axis]
   std::vector<uint64_t> shards;         // [axis]: chunks in a file; all 1 without shards
   std::vector<std::string> dimensions;  // [axis]; empty where the file has no name
-  std::vector<size_t> stored_axes;      // [axis of a chunk, slowest first] axis of the array
-  ZarrNumber number = ZarrNumber::kNone;
+  std::vector<size_t> stored_axes;      // [axis in a chunk, slowest first]: of the array
+  ZarrNumber number = ZarrNumber::kNone, declared = ZarrNumber::kNone;  // as stored; of the values
+  double scale = 1, offset = 0;  // a value: what is stored, divided by the scale, plus the offset
   enum class Text { kNone, kBytes, kUtf32, kVariable } text = Text::kNone;
   size_t value_bytes = 0;  // bytes of a stored value; 0: variable length
   bool big_endian = false;

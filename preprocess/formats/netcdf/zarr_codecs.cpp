@@ -7,6 +7,7 @@
 #include <zstd.h>
 
 #include <array>
+#include <cstring>
 #include <optional>
 #include <string_view>
 
@@ -25,6 +26,7 @@ using Bytes = std::vector<std::byte>;
 
 constexpr size_t kMaxTextBytes = 16 << 20;
 constexpr size_t kChecksumBytes = 4;
+constexpr bool kSwap = kMachineByteOrder == ByteOrder::kBig;
 
 [[noreturn]] void damaged(const std::string& place, std::string_view what) {
   throw Error("{}: {}; it is truncated or damaged: copy or write it again", place, what);
@@ -97,12 +99,44 @@ uint32_t crc32c(std::span<const std::byte> bytes) {
   return ~crc;
 }
 
-void removeChecksum(Bytes& bytes, const std::string& place) {
+/// CRC32C follows the bytes; the others stand before them.
+void removeChecksum(ZarrCodec::Kind kind, Bytes& bytes, const std::string& place) {
   if (bytes.size() < kChecksumBytes) damaged(place, "has no checksum");
+  const bool at_end = kind == ZarrCodec::Kind::kChecksum;
   const size_t count = bytes.size() - kChecksumBytes;
-  const auto stored = loadStored<uint32_t>(&bytes[count], kMachineByteOrder == ByteOrder::kBig);
-  bytes.resize(count);
-  if (crc32c(bytes) != stored) damaged(place, "has a wrong checksum");
+  const auto stored = loadStored<uint32_t>(&bytes[at_end ? count : 0], kSwap);
+  if (at_end)
+    bytes.resize(count);
+  else
+    bytes.erase(bytes.begin(), bytes.begin() + kChecksumBytes);
+  const auto* const data = reinterpret_cast<const Bytef*>(bytes.data());
+  const uint64_t found = at_end                            ? crc32c(bytes)
+                         : kind == ZarrCodec::Kind::kCrc32 ? crc32(0, data, static_cast<uInt>(count))
+                                                           : adler32(1, data, static_cast<uInt>(count));
+  if (found != stored) damaged(place, "has a wrong checksum");
+}
+
+/// Numbers of which each was stored as its difference from the one before.
+template <typename Stored>
+void addDifferences(Bytes& bytes) {
+  Stored sum{};
+  for (size_t at = 0; at + sizeof sum <= bytes.size(); at += sizeof sum) {
+    const auto difference = loadStored<Stored>(&bytes[at], kSwap);
+    sum = at == 0 ? difference : static_cast<Stored>(sum + difference);
+    Stored stored = sum;
+    if (kSwap) stored = loadStored<Stored>(reinterpret_cast<const std::byte*>(&sum), true);
+    std::memcpy(&bytes[at], &stored, sizeof stored);
+  }
+}
+
+/// Differences of integers wrap around, whatever their sign.
+void addDifferences(const ZarrCodec& codec, Bytes& bytes) {
+  if (codec.number == ZarrNumber::kFloat) return addDifferences<float>(bytes);
+  if (codec.number == ZarrNumber::kDouble) return addDifferences<double>(bytes);
+  if (codec.element_bytes == 1) return addDifferences<uint8_t>(bytes);
+  if (codec.element_bytes == 2) return addDifferences<uint16_t>(bytes);
+  if (codec.element_bytes == 4) return addDifferences<uint32_t>(bytes);
+  addDifferences<uint64_t>(bytes);
 }
 
 struct NamedDecoder {
@@ -122,11 +156,14 @@ Bytes decodedZarr(const ZarrArray& array, Bytes bytes, const std::string& place)
   const bool variable = array.value_bytes == 0;
   const size_t expected = variable ? kMaxTextBytes : array.chunkBytes();
   for (size_t n = array.codecs.size(); n-- > 0;) {
-    const auto& [kind, element_bytes] = array.codecs[n];
+    const ZarrCodec::Kind kind = array.codecs[n].kind;
     if (kind == ZarrCodec::Kind::kShuffle) {
-      bytes = unshuffled(bytes, element_bytes);
-    } else if (kind == ZarrCodec::Kind::kChecksum) {
-      removeChecksum(bytes, place);
+      bytes = unshuffled(bytes, array.codecs[n].element_bytes);
+    } else if (kind == ZarrCodec::Kind::kDelta) {
+      addDifferences(array.codecs[n], bytes);
+    } else if (kind == ZarrCodec::Kind::kChecksum || kind == ZarrCodec::Kind::kCrc32 ||
+               kind == ZarrCodec::Kind::kAdler32) {
+      removeChecksum(kind, bytes, place);
     } else {
       for (const NamedDecoder& decoder : kDecoders) {
         if (decoder.kind != kind) continue;

@@ -345,12 +345,15 @@ void ZarrFile::forEachRun(size_t number, const NetcdfBox& box, const UseRun& use
 template <typename Value>
 void ZarrFile::readNumbers(const NetcdfVariable& variable, const NetcdfBox& box, std::span<Value> to) const {
   const ZarrArray& array = arrays_.at(variable.position);
+  std::vector<double> scaled;
   forEachRun(variable.position, box, [&](const std::byte* from, size_t stride, size_t count, size_t place) {
     const std::span<Value> run = to.subspan(place, count);
-    if (from)
-      convertNumbers(array, from, stride, run);
-    else
-      std::fill(run.begin(), run.end(), static_cast<Value>(array.fill));
+    if (!from) return std::fill(run.begin(), run.end(), static_cast<Value>(array.fill));
+    if (array.scale == 1 && array.offset == 0) return convertNumbers(array, from, stride, run);
+    scaled.resize(count);
+    convertNumbers(array, from, stride, std::span(scaled));
+    std::transform(scaled.begin(), scaled.end(), run.begin(),
+                   [&](double stored) { return convertedTo<Value>(stored / array.scale + array.offset); });
   });
 }
 
