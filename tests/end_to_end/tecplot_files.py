@@ -62,12 +62,14 @@ class Binary:
         self.head += self.real(899) + self.ints(0) + self.text("name") + self.ints(0) + self.text("value")
 
     OPTIONS = {"strand": -1, "time": 0.0, "centrings": None, "shared": None, "passive": None, "point": False, "zone_type": 0,
-               "auxiliary": (), "elements": None, "elements_of": -1, "face_neighbours": False}
+               "auxiliary": (), "elements": None, "elements_of": -1, "face_neighbours": False, "faces": None}
 
     def zone(self, shape, arrays, name="", **options):
         """`shape`: of the nodes, (k, j, i). `arrays`: of each variable, None if it is shared or passive. `options`: of OPTIONS.
-        Of finite elements `shape` is the number of nodes, `elements` their nodes, from 0."""
-        strand, time, centrings, shared, passive, point, zone_type, auxiliary, elements, elements_of, face_neighbours = {**self.OPTIONS, **options}.values()
+        Of finite elements `shape` is the number of nodes, `elements` their nodes, from 0. `faces`: their corners, elements on the left
+        and right, and whether some are connected to other zones; of polygons `faces` are lines."""
+        strand, time, centrings, shared, passive, point, zone_type, auxiliary, elements, elements_of, face_neighbours, faces = {
+            **self.OPTIONS, **options}.values()
         count = len(self.variables)
         self.head += self.real(299) + self.text(name)
         if self.version >= 107:
@@ -77,7 +79,8 @@ class Binary:
             self.head += self.ints(int(point))
         self.head += self.ints(1, *centrings) if centrings else self.ints(0)
         self.head += self.ints(int(face_neighbours), 0) if self.version >= 108 else self.ints(int(face_neighbours))
-        self.head += self.ints(*shape[::-1]) if elements is None else self.ints(shape, len(elements), 0, 0, 0)
+        self.head += self.ints(*shape[::-1]) if elements is None else self.ints(
+            shape, *((len(faces[0]), sum(map(len, faces[0])), *(faces[3:] or (0, 0))) if faces else ()), len(elements), 0, 0, 0)
         for key, value in auxiliary:
             self.head += self.ints(1) + self.text(key) + self.ints(0) + self.text(value)
         self.head += self.ints(0)
@@ -97,7 +100,14 @@ class Binary:
             for a in stored:
                 self.data += flat(a).astype(a.dtype.newbyteorder(self.order)).tobytes()
         if elements is not None and elements_of < 0:
-            self.data += self.ints(*np.ravel(elements))
+            if faces:
+                corners, left, right, *connected = faces
+                ends = np.cumsum([0] + [len(face) for face in corners])
+                self.data += self.ints(*(ends if zone_type == 7 else ()), *np.concatenate(corners), *left, *right)
+                if connected:
+                    self.data += self.ints(*range(connected[0] + 1), *[0] * connected[1]) + struct.pack(f"{self.order}{connected[1]}h", *[1] * connected[1])
+            else:
+                self.data += self.ints(*np.ravel(elements))
             if face_neighbours:
                 self.data += self.ints(*[-1] * (len(elements) * {2: 2, 3: 3, 4: 4, 8: 6}[len(elements[0])]))
         self.zones += 1

@@ -132,8 +132,8 @@ class TecplotText(StructuredFormats):
     def test_what_is_refused(self):
         block = Block()
         arrays = [*block.places, block.p]
-        for words, told in (("N=4, E=1, F=FEPOINT, ET=POLYGON", "a kind of elements"),
-                            ("NODES=4 ELEMENTS=1 ZONETYPE=FEPOLYHEDRON DATAPACKING=BLOCK", "a kind of elements"),
+        for words, told in (("N=4, E=1, F=FEPOINT, ET=PRISM", "a kind of elements"),
+                            ("NODES=4 ELEMENTS=1 ZONETYPE=FEPOLYHEDRON DATAPACKING=BLOCK", "has no number of faces"),
                             ("I=9 J=9 K=1", "is flat"),
                             ("I=9 J=9 K=9", "expected 2916"),
                             (f"{size(block)} F=POINT VARLOCATION=([4]=CELLCENTERED)", "expected DATAPACKING=BLOCK"),
@@ -238,8 +238,8 @@ class TecplotBinary(StructuredFormats):
         block = Block()
         arrays = [*block.places, block.p]
         file = Binary(XYZP)
-        file.zone(block.shape, arrays, "wing", zone_type=7)
-        self.expect_line(self.write(file), words="zone 1 (wing) is FEPOLYHEDRON, a kind of elements")
+        file.zone(block.shape, arrays, "wing", zone_type=8)
+        self.expect_line(self.write(file), words="the type of a zone is 8")
         file = Binary(XYZP)
         file.zone((1, 30, 7), [a.ravel().reshape(1, 30, 7) for a in arrays])
         self.expect_line(self.write(file), words="is flat")

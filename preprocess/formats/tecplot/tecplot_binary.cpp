@@ -184,7 +184,7 @@ class Reader {
     const int32_t type = words_.integer();
     if (type > 0 && static_cast<size_t>(type) < std::size(kTypeNames))
       setTecplotElements(words_.name(), zone, number, kTypeNames[type]);
-    if (type != 0 && zone.element_nodes == 0) words_.damaged("the type of a zone", type, "0 to 7");
+    if (type != 0 && !zone.ofElements()) words_.damaged("the type of a zone", type, "0 to 7");
     if (has_packing_) layout.point = words_.flag("the packing of a zone");
     checkTecplotCounts(words_.name(), number + 1, data_.variables.size());
     // Each has a type in the data.
@@ -197,15 +197,19 @@ class Reader {
     if (layout.point && std::any_of(zone.values.begin(), zone.values.end(), isOfCells))
       words_.damaged("the packing of a zone with values of cells", "by points", "by blocks");
     layout.has_face_neighbours = words_.flag("the mark of face neighbours");
-    if (layout.has_face_neighbours && zone.element_nodes == 0)
+    if (layout.has_face_neighbours && !zone.ofElements())
       words_.damaged("the mark of face neighbours", 1, "0");
     if (version_ >= 108) {
       layout.neighbours = words_.count("the number of face neighbours");
-      if (layout.neighbours > 0) words_.integer();                            // their mode
-      if (layout.neighbours > 0 && zone.element_nodes > 0) words_.integer();  // whether they are all
+      if (layout.neighbours > 0) words_.integer();                       // their mode
+      if (layout.neighbours > 0 && zone.ofElements()) words_.integer();  // whether they are all
     }
-    if (zone.element_nodes > 0) {
+    if (zone.ofElements()) {
       zone.nodes[0] = words_.count("the number of nodes");
+      if (zone.of_faces)
+        for (uint64_t* const count :
+             {&zone.faces.count, &zone.faces.corner_count, &zone.faces.connected, &zone.faces.connections})
+          *count = words_.count("a number of faces");
       zone.elements = words_.count("the number of elements");
       if (zone.elements == 0) words_.damaged("the number of elements", 0, "1 or more");
       words_.skip(3 * 4);
@@ -291,13 +295,26 @@ class Reader {
 
   void placeElements(TecplotZone& zone, size_t number, int32_t shared) {
     if (shared >= 0) return shareTecplotElements(words_.name(), data_, static_cast<size_t>(shared), number);
-    TecplotValues& values = zone.connectivity;
-    values.type = TecplotType::kInt32;
-    values.swap = words_.swap();
-    values.bytes = std::make_shared<FileBytes>(words_.file(), 0, words_.size());
-    values.begin = words_.offset();
-    values.stride = 4;
-    words_.skip(4 * zone.elements * zone.element_nodes);
+    const auto place = [&](TecplotValues& values, uint64_t numbers) {
+      values.type = TecplotType::kInt32;
+      values.swap = words_.swap();
+      values.bytes = std::make_shared<FileBytes>(words_.file(), 0, words_.size());
+      values.begin = words_.offset();
+      values.stride = 4;
+      words_.skip(4 * numbers);
+    };
+    if (zone.of_faces) {
+      TecplotFaces& faces = zone.faces;
+      faces.has_begins = true;
+      const bool flat = zone.flat();
+      if (!flat) place(faces.sizes, faces.count + 1);
+      place(faces.corners, flat ? 2 * faces.count : faces.corner_count);
+      place(faces.left, faces.count);
+      place(faces.right, faces.count);
+      if (faces.connected > 0) words_.skip(4 * (faces.connected + 1) + 6 * faces.connections);
+      return;
+    }
+    place(zone.connectivity, zone.elements * zone.element_nodes);
     if (layouts_[number].has_face_neighbours)
       words_.skip(4 * zone.elements * (zone.element_nodes == 8 ? 6 : zone.element_nodes));
   }

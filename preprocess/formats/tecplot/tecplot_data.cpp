@@ -101,13 +101,14 @@ void shareTecplotValues(const std::string& file, TecplotData& data, size_t from,
 void shareTecplotElements(const std::string& file, TecplotData& data, size_t from, size_t to) {
   TecplotZone& zone = data.zones[to];
   if (from >= to || data.zones[from].elements != zone.elements ||
-      data.zones[from].element_nodes != zone.element_nodes ||
+      data.zones[from].element_nodes != zone.element_nodes || data.zones[from].of_faces != zone.of_faces ||
       data.zones[from].flat_elements != zone.flat_elements)
     throw Error(
         "{}: {} shares the elements of zone {}; expected one of the zones before it, with as many of the "
         "same kind",
         file, zone.describe(to), from + 1);
   zone.connectivity = data.zones[from].connectivity;
+  zone.faces = data.zones[from].faces;
 }
 
 void setTecplotElements(const std::string& file, TecplotZone& zone, size_t number, const std::string& type) {
@@ -116,10 +117,8 @@ void setTecplotElements(const std::string& file, TecplotZone& zone, size_t numbe
     uint64_t nodes;
     bool flat;
   };
-  constexpr Kind kKinds[] = {{"FETETRAHEDRON", 4, false},
-                             {"FEBRICK", 8, false},
-                             {"FELINESEG", 2, true},
-                             {"FETRIANGLE", 3, true},
+  constexpr Kind kKinds[] = {{"FETETRAHEDRON", 4, false}, {"FEBRICK", 8, false},  {"FEPOLYHEDRON", 0, false},
+                             {"FEPOLYGON", 0, true},      {"FELINESEG", 2, true}, {"FETRIANGLE", 3, true},
                              {"FEQUADRILATERAL", 4, true}};
   const auto kind = std::find_if(std::begin(kKinds), std::end(kKinds), [&](const Kind& one) {
     return type == one.name || type == one.name.substr(2);
@@ -127,14 +126,25 @@ void setTecplotElements(const std::string& file, TecplotZone& zone, size_t numbe
   if (kind == std::end(kKinds))
     throw Error(
         "{}: is a Tecplot file whose {} is {}, a kind of elements that is not read; expected ORDERED, "
-        "FETETRAHEDRON or FEBRICK",
+        "FETETRAHEDRON, FEBRICK or FEPOLYHEDRON",
         file, zone.describe(number), printable(type));
   zone.element_nodes = kind->nodes;
+  zone.of_faces = kind->nodes == 0;
   if (kind->flat) zone.flat_elements = kind->name;
 }
 
 void checkTecplotZone(const std::string& file, const TecplotZone& zone, size_t number, uint64_t most) {
   const auto [ni, nj, nk] = zone.nodes;
+  const TecplotFaces& faces = zone.faces;
+  for (const uint64_t count : {faces.count, faces.corner_count, faces.connected, faces.connections})
+    if (count > most)
+      throw Error(
+          "{}: {} declares {} faces or corners of them, more than a file of this size can hold; it is "
+          "truncated or damaged",
+          file, zone.describe(number), count);
+  if (zone.of_faces && (faces.count == 0 || (faces.corner_count == 0 && zone.flat_elements.empty())))
+    throw Error("{}: {} has no number of faces and of their corners (FACES and TOTALNUMFACENODES)", file,
+                zone.describe(number));
   if (zone.elements > most)
     throw Error(
         "{}: {} declares {} elements, more than a file of this size can hold; it is truncated or damaged",

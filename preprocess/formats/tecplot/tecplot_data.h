@@ -46,17 +46,29 @@ void readTecplotValues(const TecplotValues& values, uint64_t first, std::span<Va
 extern template void readTecplotValues(const TecplotValues&, uint64_t, std::span<float>);
 extern template void readTecplotValues(const TecplotValues&, uint64_t, std::span<double>);
 
+/// The faces of polyhedra, or the lines of polygons, which have two corners: of each the number of its corners, or in binary files where they begin; its corners; and the elements on its
+/// two sides.
+struct TecplotFaces {
+  uint64_t count = 0, corner_count = 0;
+  uint64_t connected = 0, connections = 0;  // of faces with elements of other zones
+  bool has_begins = false;
+  TecplotValues sizes, corners, left, right;
+};
+
 struct TecplotZone {
   std::string name;
   std::array<uint64_t, 3> nodes{1, 1, 1};
   std::optional<double> time;         // of a zone that belongs to a series; nullopt: it belongs to every step
   std::vector<TecplotValues> values;  // [variable]
-  // The cells of a zone of finite elements, which has nodes[0] nodes: tetrahedra or bricks; lines and faces are left out.
-  uint64_t elements = 0, element_nodes = 0;  // 0: the zone is ordered
-  TecplotValues connectivity;                // element_nodes numbers of nodes for each
-  uint64_t first_node = 0;                   // the lowest of these
-  std::string flat_elements;                 // "FETRIANGLE": they have no volume
+  // The cells of a zone of finite elements, which has nodes[0] nodes: tetrahedra, bricks or polyhedra; lines and faces are left out.
+  uint64_t elements = 0, element_nodes = 0;  // elements 0: the zone is ordered
+  bool of_faces = false;                     // polyhedra or polygons, which have no element_nodes
+  TecplotFaces faces;
+  TecplotValues connectivity;  // element_nodes numbers of nodes for each
+  uint64_t first_node = 0;     // the lowest of these
+  std::string flat_elements;   // "FETRIANGLE": they have no volume
 
+  bool ofElements() const { return element_nodes > 0 || of_faces; }
   uint64_t nodeCount() const { return nodes[0] * nodes[1] * nodes[2]; }
   bool flat() const {
     return elements == 0 ? nodes[0] < 2 || nodes[1] < 2 || nodes[2] < 2 : !flat_elements.empty();
@@ -83,7 +95,7 @@ void checkTecplotCounts(const std::string& file, size_t zones, uint64_t variable
 void shareTecplotElements(const std::string& file, TecplotData& data, size_t from, size_t to);
 
 /// Sets the nodes of an element of this type of zone ("FEBRICK"), and whether it has a volume. Throws Error if
-/// it is of polygons or polyhedra, or unknown.
+/// it is unknown.
 void setTecplotElements(const std::string& file, TecplotZone& zone, size_t number, const std::string& type);
 
 /// Throws Error if the zone's dimensions are not positive, or if it has more than `most` nodes.
@@ -122,7 +134,8 @@ bool isTecplotBinary(const InputFile& file);
 ///     357.0  its end
 ///   data, for each zone
 ///     299.0, types, passive variables, shared variables, connectivity; minimum and maximum of each stored
-///     variable; values of each variable (block) or of each node (point); face neighbours
+///     variable; values of each variable (block) or of each node (point); elements and face neighbours; of polyhedra
+///     where the corners of each face begin, its corners, the elements on its left and right, and connections
 ///
 /// Values of cells have the rows and columns of the nodes, but not their last plane. Some writers keep that
 /// plane, too, and some write the packing in version 112: the variant that fits the file counts.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <set>
@@ -15,6 +16,7 @@
 #include "preprocess/formats/common/element_source.h"
 #include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/tecplot/tecplot_data.h"
+#include "preprocess/formats/tecplot/tecplot_polyhedra.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
@@ -220,7 +222,17 @@ class TecplotBlocks final : public BlockSource {
 
 class TecplotMesh final : public ElementSource {
  public:
-  explicit TecplotMesh(TecplotGrid grid) : grid_(std::move(grid)) { description_ = grid_.description; }
+  TecplotMesh(TecplotGrid grid, const std::filesystem::path& temporary_folder) : grid_(std::move(grid)) {
+    description_ = grid_.description;
+    const ListSpools spools(temporary_folder);
+    for (size_t n = 0; n < grid_.data.zones.size(); ++n) {
+      const TecplotZone& zone = grid_.data.zones[n];
+      polyhedra_.push_back(
+          zone.of_faces ? std::make_unique<const TecplotPolyhedra>(
+                              zone, fmt::format("{}: {}", description_.files[0], zone.describe(n)), spools)
+                        : nullptr);
+    }
+  }
 
  private:
   void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override {
@@ -233,11 +245,13 @@ class TecplotMesh final : public ElementSource {
   }
 
   const TecplotGrid grid_;
+  std::vector<std::unique_ptr<const TecplotPolyhedra>> polyhedra_;  // [zone]; null of other elements
 };
 
 /// A brick whose nodes coincide is a wedge, a pyramid or a tetrahedron: a degenerate hexahedron, which has its volume.
 void TecplotMesh::appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshCells& out) const {
   const TecplotZone& zone = grid_.data.zones.at(piece);
+  if (zone.of_faces) return polyhedra_[piece]->append(first, count, out);
   const uint64_t each = zone.element_nodes;
   std::vector<double> numbers(count * each);
   readTecplotValues(zone.connectivity, first * each, std::span(numbers));
@@ -257,7 +271,7 @@ bool isTecplot(const InputFile& file) {
 
 std::unique_ptr<DataSource> openTecplot(const OpenGridOptions& options) {
   TecplotGrid grid(options);
-  if (grid.isMesh()) return std::make_unique<TecplotMesh>(std::move(grid));
+  if (grid.isMesh()) return std::make_unique<TecplotMesh>(std::move(grid), options.temporary_folder);
   return std::make_unique<TecplotBlocks>(std::move(grid));
 }
 

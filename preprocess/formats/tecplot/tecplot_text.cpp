@@ -154,14 +154,14 @@ class Reader {
       }
     }
     // Tecplot before version 10, and FUN3D, give the counts of nodes and elements as I and J.
-    if (zone.element_nodes > 0 && zone.elements == 0 && text.has_j) {
+    if (zone.ofElements() && zone.elements == 0 && text.has_j) {
       zone.elements = zone.nodes[1];
       zone.nodes[1] = 1;
     }
     if (text.time && text.strand.value_or(1) != 0) zone.time = text.time;
     checkTecplotZone(file_->name(), zone, data_.zones.size() - 1, kMaxDimension);
     zone.first_node = 1;
-    if ((zone.elements > 0) != (zone.element_nodes > 0))
+    if ((zone.elements > 0) != zone.ofElements())
       fail("has a zone of finite elements without NODES, ELEMENTS and ZONETYPE");
   }
 
@@ -196,6 +196,12 @@ class Reader {
       zone.nodes[0] = count();
     } else if (key == "ELEMENTS" || key == "E") {
       zone.elements = count();
+    } else if (key == "FACES") {
+      zone.faces.count = count();
+    } else if (key == "TOTALNUMFACENODES") {
+      zone.faces.corner_count = count();
+    } else if (key == "NUMCONNECTEDBOUNDARYFACES" || key == "TOTALNUMBOUNDARYCONNECTIONS") {
+      (key[0] == 'N' ? zone.faces.connected : zone.faces.connections) = word == "0" ? 0 : count();
     } else if (key == "CONNECTIVITYSHAREZONE") {
       if (count() > index) badValue(key, value);
       text.elements_of = static_cast<int64_t>(count()) - 1;
@@ -303,11 +309,24 @@ class Reader {
     if (text.elements_of >= 0) {
       shareTecplotElements(file_->name(), data_, static_cast<size_t>(text.elements_of), index);
     } else if (zone.elements > 0) {
-      stored.push_back(&zone.connectivity);
-      zone.connectivity.type = TecplotType::kDouble;
-      zone.connectivity.begin = 8 * expected;
-      zone.connectivity.stride = 8;
-      expected += zone.elements * zone.element_nodes;
+      TecplotFaces& faces = zone.faces;
+      const auto place = [&](TecplotValues& values, uint64_t numbers) {
+        stored.push_back(&values);
+        values.type = TecplotType::kDouble;
+        values.begin = 8 * expected;
+        values.stride = 8;
+        expected += numbers;
+      };
+      if (!zone.of_faces) {
+        place(zone.connectivity, zone.elements * zone.element_nodes);
+      } else {
+        const bool flat = zone.flat();
+        if (!flat) place(faces.sizes, faces.count);
+        place(faces.corners, flat ? 2 * faces.count : faces.corner_count);
+        place(faces.left, faces.count);
+        place(faces.right, faces.count);
+        expected += faces.connected + 2 * faces.connections;
+      }
     }
     if (count < expected) failAtWord(count, expected);
     if (count != expected)
