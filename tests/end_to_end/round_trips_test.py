@@ -220,6 +220,9 @@ class RoundTrips(StructuredFormats):
             ranges = [[s["min"], s["max"]] for s in info["scalars"]]
             np.testing.assert_allclose(ranges, [[a.min(), a.max()] for a in (block.p, block.c)], rtol=1e-6)
         self.assertEqual(caches["b.vtu"], caches["c.vtk"])  # meshio writes eleven digits of text
+        integers = meshio.Mesh(mesh.points, mesh.cells, cell_data={"n": [np.arange(low.size, dtype="i4")]})
+        integers.write(self.folder / "e.vtk")  # as vtktypeint32, a word of meshio's
+        self.assertEqual(self.info(self.folder / "e.vtk")["scalars"][0]["max"], low.size - 1)
         path = self.folder / "d.xdmf"
         mesh.write(path)
         self.assertEqual([self.cache([path], scalar) for scalar in "pc"], caches["b.vtu"])
