@@ -230,6 +230,15 @@ class XdmfMeshes(MeshFormats):
             with self.subTest(told=told):
                 self.expect_line(self.write(self.grid(mesh, topology)), words=told)
 
+    def test_a_filter_that_hdf5_lacks(self):
+        mesh = Mesh(2, (8,))
+        text = self.grid(mesh, ("Hexahedron", 8, np.array(mesh.cells)))
+        with h5py.File(self.folder / "a.h5", "a") as f:
+            number = next(name for name in f if f[name].shape == mesh.points.shape)
+            del f[number]
+            f.create_dataset(number, data=mesh.points, chunks=True, compression="lzf")  # h5py's own
+        self.expect_line(self.write(text), words="is compressed by the HDF5 filter 'lzf', which is not installed; write it with gzip")
+
     def test_damage(self):
         mesh = Mesh(2)
         self.write(self.grid(mesh, self.mixed(mesh), "XML"))

@@ -9,6 +9,7 @@
 
 #include "preprocess/formats/common/array_boxes.h"
 #include "preprocess/formats/common/library_trial.h"
+#include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -28,6 +29,22 @@ std::vector<uint64_t> extentOf(const Hdf5Space& space) {
 bool isVirtual(hid_t set) {
   const Hdf5Handle<H5Pclose> properties(H5Dget_create_plist(set));
   return properties && H5Pget_layout(properties.id()) == H5D_VIRTUAL;
+}
+
+/// The first filter of a data set that HDF5 does not have on this machine; empty if it has all.
+std::string missingFilter(hid_t set) {
+  const Hdf5Handle<H5Pclose> properties(H5Dget_create_plist(set));
+  const int count = properties ? H5Pget_nfilters(properties.id()) : 0;
+  for (int n = 0; n < count; ++n) {
+    std::array<char, 64> name{};
+    unsigned flags = 0;
+    size_t values = 0;
+    const H5Z_filter_t filter = H5Pget_filter2(properties.id(), static_cast<unsigned>(n), &flags, &values,
+                                               nullptr, name.size() - 1, name.data(), nullptr);
+    if (filter >= 0 && H5Zfilter_avail(filter) <= 0)
+      return name[0] != 0 ? printable(name.data()) : fmt::format("{}", filter);
+  }
+  return "";
 }
 
 }  // namespace
@@ -132,8 +149,16 @@ void Hdf5Array::readParts(As as, const std::function<void(const ReadPart&)>& use
           H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, from.data(), step.data(), count.data(), nullptr) <
               0 ||
           H5Dread(set, as == As::kDouble ? H5T_NATIVE_DOUBLE : memoryType(), memory.id(), space.id(),
-                  H5P_DEFAULT, to) < 0)
-        fail("cannot be read (HDF5: " + hdf5Reason() + "); the file is damaged");
+                  H5P_DEFAULT, to) < 0) {
+        const std::string reason = hdf5Reason();
+        if (const std::string filter = missingFilter(set); !filter.empty())
+          fail(
+              fmt::format("is compressed by the HDF5 filter '{}', which is not installed; write it with "
+                          "gzip, or install the filter's "
+                          "plugin where HDF5_PLUGIN_PATH names it",
+                          filter));
+        fail("cannot be read (HDF5: " + reason + "); the file is damaged");
+      }
     });
   });
 }
