@@ -95,6 +95,8 @@ class WindowTest : public ProgramSuite<WindowTest> {
     press("Return");
     EXPECT_TRUE(eventually([] { return !hasWidget("file name"); })) << name;
   }
+  /// Shows a tab of the panels: Colour, Objects, View, or Time.
+  void tab(const std::string& name) { click("tab " + name); }
   void addPoint() { click(placeOf("curve", 0.28, 0.2)); }
   void chooseScalar(const std::string& name) {
     click("scalar");

@@ -28,12 +28,8 @@ class WindowPanels : public WindowTest {
     })) << begin;
     return name;
   }
-  /// Unfolds the list of markers, below others that make room.
   void openMarkers() {
-    click("Colours and opacities");
-    EXPECT_TRUE(gone("curve"));
-    click("Picture");
-    EXPECT_TRUE(gone("scalar bar"));
+    tab("Objects");
     click("Markers");
   }
   static bool gone(const std::string& begin) {
@@ -115,15 +111,14 @@ TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
 TEST_F(WindowPanels, WhatTheMenuAddsIsUnfolded) {
   open();
   save();  // it hears
-  for (const auto& [above, within] :
-       {std::pair{"Colours and opacities", "curve"}, {"Picture", "light"}, {"View", "Fly"}}) {
-    click(above);  // what is below needs not be scrolled to
-    EXPECT_TRUE(gone(within));
-  }
+  tab("Objects");
   widget("Clip planes");
   EXPECT_FALSE(hasWidget("remove clip plane"));
-  choose("Picture", "Add a clip plane");
+  tab("Colour");
+  placeOf("curve");
+  choose("Picture", "Add a clip plane");  // shows its tab
   EXPECT_EQ(widget("remove clip plane"), "remove clip plane 1");
+  widget("Clip planes (1)");
   EXPECT_FALSE(hasWidget("remove slice"));
   click("Clip planes");  // what the user folds stays folded
   EXPECT_TRUE(gone("remove clip plane"));
@@ -208,8 +203,7 @@ TEST_F(WindowPanels, UndoAndRedo) {
 TEST_F(WindowPanels, SavesSeveralViews) {
   open();
   const Image first = save();
-  click("Colours and opacities");  // room for the names
-  save();
+  tab("View");
   click("view name");
   act({"type", "a/b view"});  // keys of the window are letters here
   press("Return");
@@ -224,8 +218,7 @@ TEST_F(WindowPanels, SavesSeveralViews) {
   close();
   open();
   save();
-  click("Colours and opacities");
-  save();
+  tab("View");
   click("view view 2");
   EXPECT_GE(difference(save(), dark), 50);
   click("remove view view 2");
@@ -287,7 +280,7 @@ TEST_F(WindowPanels, ThemeAndTextSizeAreRemembered) {
 TEST_F(WindowPanels, EditsColoursAndKeepsThemBesideThePicture) {
   open();
   const Image first = save();
-  for (const char* next : {"Scalar", "colour points", "edit these colours"}) {
+  for (const char* next : {"colour points", "edit these colours"}) {
     click(next);
     save();
   }

@@ -284,6 +284,7 @@ TEST_F(WindowSession, LeavesAScreenshotOfEveryStep) {
   shows("4_opacity_edited", 35);
   chooseScalar("volume");
   shows("5_another_scalar", 35);
+  tab("View");
   click("dark");
   shows("6_dark", 15);
   resize({900, 640});

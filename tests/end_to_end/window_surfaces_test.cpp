@@ -11,16 +11,10 @@ class WindowSurfaces : public WindowTest {
   static bool gone(const std::string& begin) {
     return eventually([&] { return !hasWidget(begin); });
   }
-  /// Opens the window with room for the panels of surfaces.
-  void openWithRoom(const Words& options = {}, ImageSize size = kWindow) {
+  /// Opens the window with its list of objects.
+  void openObjects(const Words& options = {}, ImageSize size = kWindow) {
     open(options, size);
-    for (const auto& [section, inside] :
-         {std::pair("Colours and opacities", "curve"), {"Scalar", "opacity by"}, {"View", "view name"}})
-      fold(section, inside);
-  }
-  void fold(const std::string& section, const std::string& inside) {
-    click(section);
-    EXPECT_TRUE(gone(inside)) << section;
+    tab("Objects");
   }
   void unfold(const std::string& section, const std::string& first) {
     click(section);
@@ -33,7 +27,7 @@ class WindowSurfaces : public WindowTest {
 };
 
 TEST_F(WindowSurfaces, FacesOfTheGridAreAddedColouredUndoneAndRemoved) {
-  openWithRoom();
+  openObjects();
   const Image plain = save();
   unfold("Surfaces", "add surface");
   addFaces("kmin");
@@ -73,7 +67,7 @@ TEST_F(WindowSurfaces, FacesOfTheGridAreAddedColouredUndoneAndRemoved) {
 
 /// Surfaces are there again in the next window, without the volume that was switched off.
 TEST_F(WindowSurfaces, AreRemembered) {
-  openWithRoom();
+  openObjects();
   choose("Picture", "Add an isosurface");
   placeOf("remove isosurface 1");
   click("Isosurfaces");  // room for the others
@@ -82,7 +76,7 @@ TEST_F(WindowSurfaces, AreRemembered) {
   addFaces("imax");
   placeOf("remove surface 1");
   const Image with_volume = save();
-  click("volume");
+  click("eye of volume");
   const Image alone = saveAndCopy();
   EXPECT_LT(difference(with_volume, alone), 40);
   const auto commands = close();
@@ -95,8 +89,8 @@ TEST_F(WindowSurfaces, AreRemembered) {
   close();
 }
 
-TEST_F(WindowSurfaces, IsosurfacesAreMovedAndLeaveWithTheirScalar) {
-  openWithRoom();
+TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
+  openObjects();
   const Image plain = save();
   unfold("Isosurfaces", "Add an isosurface");
   click("Add an isosurface");
@@ -113,21 +107,35 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndLeaveWithTheirScalar) {
   EXPECT_GE(difference(save(), middle), 50);
   press("ctrl+y");
   save();
-  click("Scalar");
+  // Another scalar's picture has none of this one's isosurfaces, unless the volume is hidden.
+  tab("Colour");
   chooseScalar("volume");
-  EXPECT_TRUE(gone("remove isosurface 1"));
-  EXPECT_TRUE(eventually([] { return hasWidget("message The isosurfaces of f were removed"); }));
+  tab("Objects");
+  placeOf("isosurface 1 is not drawn");
+  const Image without = saveAndCopy();
+  click("eye of volume");
+  moveTo(rest_);
+  const Image alone = saveAndCopy();
+  EXPECT_LT(difference(without, alone), 40);
+  // Its own scalar can be chosen.
+  click("scalar of isosurface 1");
+  click("isosurface 1 by volume");
+  moveTo(rest_);
+  const Image of_volume = saveAndCopy();
+  EXPECT_LT(difference(alone, of_volume), 45);
   const auto commands = close();
-  ASSERT_EQ(commands.size(), 2u);
+  ASSERT_EQ(commands.size(), 5u);
   EXPECT_NE(valueOf(commands[0], "--iso"), valueOf(commands[1], "--iso"));
-  expectDraws(commands[0], middle);
-  expectDraws(commands[1], higher);
+  EXPECT_EQ(valueOf(commands[2], "--iso"), "");
+  EXPECT_EQ(valueOf(commands[3], "--iso-by"), "f");
+  EXPECT_EQ(valueOf(commands[4], "--iso-by"), "");
+  const Image* const pictures[] = {&middle, &higher, &without, &alone, &of_volume};
+  for (size_t n = 0; n < 5; ++n) expectDraws(commands[n], *pictures[n]);
 }
 
 /// Widgets with one label below two headings both work: of all that can be listed at once, none is another's twin.
 TEST_F(WindowSurfaces, NoTwoWidgetsAreOne) {
-  openWithRoom({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);
-  fold("Picture", "scalar bar");
+  openObjects({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);
   const Image both = save();
   EXPECT_FALSE(hasWidget("twins:"));
   click("isosurfaces by function");
@@ -143,7 +151,7 @@ TEST_F(WindowSurfaces, NoTwoWidgetsAreOne) {
 
 /// A clip plane's coordinate can be typed, and stays where it is when the other side is kept.
 TEST_F(WindowSurfaces, AClipPlaneIsAtACoordinate) {
-  openWithRoom();
+  openObjects();
   const Image whole = save();
   choose("Picture", "Add a clip plane");
   click("x clip plane 1");
@@ -174,15 +182,40 @@ TEST_F(WindowSurfaces, AClipPlaneIsAtACoordinate) {
 
 /// The window ends above the list.
 TEST_F(WindowSurfaces, WhatTheMenuAddsIsScrolledTo) {
-  open();
+  open({"--iso", "0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9"});
   save();
-  ASSERT_GT(placeOf("Isosurfaces").second, kWindow.height);
-  choose("Picture", "Add an isosurface");
+  tab("Objects");
+  ASSERT_GT(placeOf("Slices").second, kWindow.height);
+  tab("Colour");
+  choose("Picture", "Add a slice");
   EXPECT_TRUE(eventually([] {
-    const auto place = placeNow("isosurface 1", 0.5, 1);
+    const auto place = placeNow("slice 1", 0.5, 1);
     return place && place->second < kWindow.height;
   }));
   close();
+}
+
+/// What is hidden stays in the list, and is not in the command.
+TEST_F(WindowSurfaces, EyesHideWhatIsListed) {
+  openObjects({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);
+  placeOf("Isosurfaces (1)");
+  const Image all = save();
+  for (const char* object : {"surface 1", "isosurface 1", "slice 1"}) {
+    click(std::string("eye of ") + object);
+    moveTo(rest_);
+  }
+  const Image none = saveAndCopy();
+  EXPECT_LT(difference(all, none), 40);
+  EXPECT_TRUE(hasWidget("remove surface 1"));
+  click("eye of surface 1");
+  moveTo(rest_);
+  const Image surface = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  for (const char* option : {"--surface", "--iso", "--slice"}) EXPECT_EQ(valueOf(commands[0], option), "");
+  EXPECT_EQ(valueOf(commands[1], "--surface"), "kmin");
+  expectDraws(commands[0], none);
+  expectDraws(commands[1], surface);
 }
 
 TEST_F(WindowSurfaces, OfFilesAreAddedByTheDialog) {
@@ -192,7 +225,7 @@ TEST_F(WindowSurfaces, OfFilesAreAddedByTheDialog) {
     std::ofstream broken("broken.stl");
     broken << "solid but no triangle";
   }
-  openWithRoom();
+  openObjects();
   const Image plain = save();
   choose("Picture", "Add a surface from a file...");
   answer("broken.stl");

@@ -236,15 +236,14 @@ TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
   press("Return");
   const Image ranged = save();
   EXPECT_LT(difference(logarithmic, ranged), 45);
-  click("Colours and opacities");  // room for those below
-  placeOf("Clip box");
-  save();
+  tab("Objects");
   click("Clip box");
   save();
   click("clip");
   save();
   drag(1, placeOf("clip x", 0.15), placeOf("clip x", 0.8));
   save();
+  tab("View");
   click("dark");
   const Image clipped = saveAndCopy();
   EXPECT_LT(difference(ranged, clipped), 20);
@@ -326,6 +325,7 @@ TEST_F(WindowTest, OpensAStateFile) {
   open();
   const Image first = save();
   dragPicture(1, 0.15, -0.05);
+  tab("View");
   click("dark");
   const Image before = save();
   close();

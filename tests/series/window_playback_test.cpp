@@ -174,12 +174,34 @@ TEST_F(WindowPlayback, KeysChooseTheStepAndPlay) {
   expectDraws(commands[3], stopped);
 }
 
+TEST_F(WindowPlayback, ButtonsUnderThePictureGoToSteps) {
+  open();
+  placeOf("step 1 of 4");
+  EXPECT_GT(placeOf("Last step").second, placeOf("picture", 0.5, 1).second);
+  const Image first = saveAndCopy();
+  click("Last step");
+  placeOf("step 4 of 4");
+  const Image last = saveAndCopy();
+  click("Previous step");
+  placeOf("step 3 of 4");
+  press("Home");
+  placeOf("step 1 of 4");
+  const Image again = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 3u);
+  EXPECT_EQ(valueOf(commands[1], "--step"), "3");
+  EXPECT_EQ(valueOf(commands[2], "--step"), "0");
+  expectDraws(commands[1], last);
+  EXPECT_GE(difference(first, again), 50);
+}
+
 TEST_F(WindowPlayback, PlaysBackwards) {
   open();
   const Image first = saveAndCopy();
   press("comma");  // round to the last
   const Image last = saveAndCopy();
   EXPECT_LT(difference(first, last), 60);
+  tab("Time");
   click("loop");
   click("backwards");
   moveTo(rest_);
@@ -230,6 +252,7 @@ TEST_F(WindowPlayback, OpensAtAStep) {
 
 TEST_F(WindowPlayback, InterpolatesBetweenSteps) {
   open();
+  tab("Time");
   click("interpolate between steps");
   click(placeOf("step", 0.5, 0.5));
   moveTo(rest_);

@@ -30,13 +30,13 @@ ViewState changedState() {
   state.lod_pixels = 2.5;
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
-  state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
-  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25}};
-  state.faces = {{"block 3:k=min", {0, 1, 0.5f}, {0.5, true}}, {"walls"}};
+  state.clip_planes = {{ClipPlane{{0, 0.5, 0}, {1, 0, -2}}}, {ClipPlane{{0.25, 0, 0}, {0, 1, 0}}, false}};
+  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25, false}};
+  state.faces = {{"block 3:k=min", {0, 1, 0.5f}, {0.5, true}}, {"walls", {0.5f, 0.5f, 0.5f}, {}, false}};
   state.faces_by = FacesScalar{"density", EditedFunction("magma", 0.5, 2, 0.1)};
-  state.isovalues = {0.25, -0.5};
+  state.isosurfaces = {{"density", 0.25}, {"u v", -0.5, false}};
   state.iso_opacity = {0.75, true};
-  state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
+  state.slices = {{ClipPlane{{0, 0.25, 0}, {0, -1, 2}}, false}};
   state.slice_opacity = {0.5, true};
   state.volume = false;
   state.lit = true;
@@ -65,8 +65,8 @@ TEST(ViewState, ComesBackFromItsText) {
 TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   auto json = nlohmann::json::parse(toJson(changedState()));
   for (const char* field :
-       {"clip_planes", "surfaces", "faces", "faces_by", "isovalues", "iso_opacity", "isosurfaces_by_function",
-        "slices", "slice_opacity", "slices_by_function", "volume"})
+       {"clip_planes", "surfaces", "faces", "faces_by", "isovalues", "isosurfaces", "iso_opacity",
+        "isosurfaces_by_function", "slices", "slice_opacity", "slices_by_function", "volume"})
     json.erase(field);
   json.erase("lit");
   json.erase("gradient_opacity");
@@ -75,7 +75,7 @@ TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   EXPECT_TRUE(state.surfaces.empty());
   EXPECT_TRUE(state.faces.empty());
   EXPECT_FALSE(state.faces_by);
-  EXPECT_TRUE(state.isovalues.empty());
+  EXPECT_TRUE(state.isosurfaces.empty());
   EXPECT_TRUE(state.slices.empty());
   EXPECT_TRUE(state.volume);
   EXPECT_FALSE(state.lit);
@@ -112,7 +112,7 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/faces/0/opacity", 2, "faces[0].opacity");
   expectError("/faces/1/colour", nlohmann::json::array({0, 0, 2}), "faces[1].colour");
   expectError("/faces_by/variable", "pressure", "faces_by.variable");
-  expectError("/isovalues/1", "high", "isovalues[1]");
+  expectError("/isosurfaces/1/value", "high", "isosurfaces[1].value");
   expectError("/slice_opacity", 2, "slice_opacity");
   expectError("/slices_by_function", 2, "slices_by_function");
   expectError("/surfaces/0/opacity", 0, "surfaces[0].opacity");
@@ -159,7 +159,8 @@ TEST(ViewState, OfAnotherCacheHasNothingOfScalarsThatThatLacks) {
   EXPECT_EQ(state.function.range(), std::pair(5.0, 6.0));
   EXPECT_FALSE(state.opacity_by);
   EXPECT_FALSE(state.faces_by);
-  EXPECT_TRUE(state.isovalues.empty());
+  ASSERT_EQ(state.isosurfaces.size(), 2u);  // which come back with their scalars
+  for (const Isosurface& one : state.isosurfaces) EXPECT_FALSE(one.visible) << one.scalar;
   EXPECT_EQ(state.camera.position, before.camera.position);
   EXPECT_EQ(state.slices.size(), 1u);
 }
@@ -213,6 +214,42 @@ TEST(RenderCommand, LeavesDefaultsOut) {
             "--parallel-scale 0.7");
 }
 
+/// Those of the scalar that the picture has; without the volume, of any.
+TEST(ViewState, DrawsIsosurfacesOfOneScalar) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  chooseVariable(state, manifest(), "u v");
+  state.isosurfaces = {{"density", 1}, {"u v", 0.25}, {"u v", 0.5, false}, {"density", 2}};
+  using Values = std::vector<double>;
+  EXPECT_EQ(state.isovalues(), Values{0.25});
+  state.opacity_by = OpacityScalar{"density", EditedFunction("inferno", 0.5, 2, 0.1)};
+  EXPECT_EQ(state.isovalues(), (Values{1, 2}));
+  EXPECT_FALSE(state.frameOptions({3, 2}).scene->iso_of_colours);
+  state.isosurfaces[0].visible = state.isosurfaces[3].visible = false;
+  EXPECT_EQ(state.isovalues(), Values{0.25});
+  EXPECT_TRUE(state.frameOptions({3, 2}).scene->iso_of_colours);
+  expectParts(commandText(state, "a.splats"), {"--opacity-by density", "--iso 0.25", "--iso-by 'u v'"});
+
+  state.opacity_by.reset();
+  state.isosurfaces = {{"density", 1}};
+  EXPECT_TRUE(state.isovalues().empty());
+  EXPECT_EQ(commandText(state, "a.splats").find("--iso"), std::string::npos);
+  state.volume = false;
+  EXPECT_EQ(state.isovalues(), Values{1});
+  expectParts(commandText(state, "a.splats"), {"--iso 1", "--iso-by density", "--volume off"});
+}
+
+TEST(ViewState, OfAnEarlierVersionHasIsosurfacesOfItsOpacities) {
+  auto json = nlohmann::json::parse(toJson(changedState()));
+  json.erase("isosurfaces");
+  json["isovalues"] = {0.75, "high"};
+  expectError([&] { viewStateFromJson(json.dump(), "a.json", manifest()); }, {"a.json", "isovalues[1]"});
+  json["isovalues"] = {0.75, 1};
+  const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
+  ASSERT_EQ(state.isosurfaces.size(), 2u);
+  EXPECT_EQ(state.isosurfaces[1].scalar, "density");
+  EXPECT_EQ(state.isosurfaces[1].value, 1);
+}
+
 TEST(RenderCommand, HasEveryOption) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   chooseVariable(state, manifest(), "u v");
@@ -221,13 +258,13 @@ TEST(RenderCommand, HasEveryOption) {
   state.lod_pixels = 2.5;
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
-  state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
+  state.clip_planes = {{ClipPlane{{0, 0.5, 0}, {1, 0, -2}}}, {ClipPlane{{0.25, 0, 0}, {0, 1, 0}}}};
   state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25}};
   state.faces = {{"block 3:k=min", {0, 1, 0.5f}, {0.5, true}}};
   state.faces_by = FacesScalar{"density", EditedFunction("magma", 0.5, 2, 0.1)};
-  state.isovalues = {0.25, -0.5};
+  state.isosurfaces = {{"u v", 0.25}, {"u v", -0.5}};
   state.iso_opacity = {0.75, false};
-  state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
+  state.slices = {{ClipPlane{{0, 0.25, 0}, {0, -1, 2}}}};
   state.slice_opacity = {0.5, true};
   state.volume = false;
   state.lit = true;

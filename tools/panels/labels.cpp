@@ -1,5 +1,6 @@
 #include "tools/panels/labels.h"
 
+#include <fmt/format.h>
 #include <imgui.h>
 
 #include "tools/window/widgets.h"
@@ -33,6 +34,36 @@ bool option(const char* text, bool& value) {
   return changed;
 }
 
+bool eye(bool& visible, const std::string& name) {
+  const float side = ImGui::GetFrameHeight();
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  const bool clicked = ImGui::InvisibleButton("##eye", {side, side});
+  nameWidget("eye of " + name);
+  if (clicked) visible = !visible;
+  const bool is_hovered = ImGui::IsItemHovered();
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  if (is_hovered)
+    list->AddRectFilled(from, {from.x + side, from.y + side}, ImGui::GetColorU32(ImGuiCol_FrameBgHovered),
+                        ImGui::GetStyle().FrameRounding);
+  const ImU32 colour = ImGui::GetColorU32(visible ? ImGuiCol_Text : ImGuiCol_TextDisabled);
+  const float line = 0.09f * side, middle = from.y + 0.5f * side;
+  const ImVec2 left(from.x + 0.15f * side, middle), right(from.x + 0.85f * side, middle);
+  const float x = from.x + 0.5f * side, lid = 0.55f * side;
+  list->AddBezierQuadratic(left, {x, middle + lid}, right, colour, line);
+  if (visible) {
+    list->AddBezierQuadratic(left, {x, middle - lid}, right, colour, line);
+    list->AddCircleFilled({x, middle}, 0.14f * side, colour);
+  }
+  hint(visible ? "hide" : "show");
+  return clicked;
+}
+
+void heading(const char* text) {
+  ImGui::Spacing();
+  ImGui::TextUnformatted(text);
+  ImGui::Separator();
+}
+
 Section::Section(const char* text, bool open_at_first)
     : open_(ImGui::CollapsingHeader(text, open_at_first ? ImGuiTreeNodeFlags_DefaultOpen : 0)) {
   nameWidget(text);
@@ -45,23 +76,26 @@ Section::~Section() {
 
 namespace {
 
-bool unfoldsFor(const char* text, const std::optional<size_t>& seen, size_t number) {
+bool unfoldsFor(const std::string& text, const std::optional<size_t>& seen, size_t number) {
   const bool has_more = number > seen.value_or(0);
   if (has_more) ImGui::SetNextItemOpen(true);
   // Only a list that was folded is scrolled to: one that is in use must not move under the mouse. Nor do the panels begin
   // at a list.
-  return has_more && seen && ImGui::GetStateStorage()->GetInt(ImGui::GetID(text)) == 0;
+  return has_more && seen && ImGui::GetStateStorage()->GetInt(ImGui::GetID(text.c_str())) == 0;
 }
 
 }  // namespace
 
-Section::Section(const char* text, std::optional<size_t>& seen, size_t number)
-    : open_(unfoldsFor(text, seen, number)) {
+Section::Section(const char* text, std::optional<size_t>& seen, size_t number) {
   constexpr float kSeenLines = 8;  // of the list below its header
-  const bool unfolds = open_;
+  // The same widget for any number.
+  const std::string shown = number == 0 ? text : fmt::format("{} ({})", text, number);
+  const std::string label = fmt::format("{}###{}", shown, text);
+  const bool unfolds = unfoldsFor(label, seen, number);
   seen = number;
-  open_ = ImGui::CollapsingHeader(text);
+  open_ = ImGui::CollapsingHeader(label.c_str());
   nameWidget(text);
+  if (number > 0) nameWidget(shown);
   const float end = ImGui::GetWindowPos().y + ImGui::GetWindowHeight();
   if (unfolds && ImGui::GetItemRectMax().y + kSeenLines * ImGui::GetFrameHeight() > end)
     ImGui::SetScrollHereY(0);

@@ -43,12 +43,16 @@ void commandButton(Command command, PanelActions& actions, const char* text = nu
 void commandOption(Command command, PanelActions& actions, const char* text, bool on);
 /// A checkbox; named by its label. Returns whether it changed.
 bool option(const char* text, bool& value);
+/// An eye that shows or hides an object; named "eye of NAME". Returns whether it was clicked.
+bool eye(bool& visible, const std::string& name);
+/// A line of text above a group of widgets.
+void heading(const char* text);
 /// A heading that folds what is below. Named by its text. While one that is unfolded is in scope, widgets are told apart
 /// from those of the same label below other headings.
 class Section {
  public:
   Section(const char* text, bool open_at_first);
-  /// A section with a list, which is folded at first. It unfolds if the list has grown, by the menu or by a
+  /// A section with a list, which is folded at first, and whose heading counts the entries. It unfolds if the list has grown, by the menu or by a
   /// saved view, and is then scrolled to if it would lie below the window's end. `seen`: how many entries
   /// there were in the frame before; nullopt before the first frame.
   Section(const char* text, std::optional<size_t>& seen, size_t number);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stream/base/calendar.h"
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 #include "tools/panels/labels.h"
@@ -16,68 +15,115 @@
 
 namespace curvisplat {
 
+namespace {
+
+void pushTabPadding() {
+  const float unit = ImGui::GetFontSize();
+  ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {0.9f * unit, 0.4f * unit});
+}
+
+/// A tab while it is in scope; false while another one is shown. Named "tab NAME". What it has scrolls by itself, above
+/// the footer.
+class Tab {
+ public:
+  Tab(const char* name, float footer, bool select = false) {
+    pushTabPadding();
+    open_ = ImGui::BeginTabItem(name, nullptr, select ? ImGuiTabItemFlags_SetSelected : 0);
+    ImGui::PopStyleVar();
+    nameWidget(std::string("tab ") + name);
+    if (!open_) return;
+    // The scroll bar is always there, so that widgets keep their width.
+    ImGui::BeginChild("scrolled", {0, -footer}, false, ImGuiWindowFlags_AlwaysVerticalScrollbar);
+  }
+  ~Tab() {
+    if (!open_) return;
+    ImGui::EndChild();
+    ImGui::EndTabItem();
+  }
+  Tab(const Tab&) = delete;
+  Tab& operator=(const Tab&) = delete;
+  explicit operator bool() const { return open_; }
+
+ private:
+  bool open_ = false;
+};
+
+void drawFooter(PanelActions& actions) {
+  ImGui::Separator();
+  commandButton(Command::kSavePicture, actions, "save picture");
+  ImGui::SameLine();
+  commandButton(Command::kSaveTurnMovie, actions, "movie once around...");
+  ImGui::SameLine();
+  commandButton(Command::kCopyCommand, actions, "copy command");
+}
+
+}  // namespace
+
 PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   PanelActions actions;
   ImGui::SetNextWindowPos({static_cast<float>(facts.place.x), static_cast<float>(facts.place.y)});
   ImGui::SetNextWindowSize({static_cast<float>(facts.place.width), static_cast<float>(facts.place.height)});
-  // The scroll bar is always there, so that widgets keep their width.
   constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                                       ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoSavedSettings |
-                                      ImGuiWindowFlags_NoBringToFrontOnFocus |
-                                      ImGuiWindowFlags_AlwaysVerticalScrollbar;
+                                      ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoScrollbar |
+                                      ImGuiWindowFlags_NoScrollWithMouse;
   ImGui::Begin("panels", nullptr, kFixed);
-  if (facts.playback && facts.playback->steps() > 1)
-    if (const Section open{"Time", true}) drawTime(actions, *facts.playback);
-  if (const Section open{"Scalar", true}) drawScalars(state, facts, actions);
-  if (const Section open{"Colours and opacities", true})
-    drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const float footer = ImGui::GetFrameHeight() + 2 * style.ItemSpacing.y + 1;
+  // Before the lists are drawn, which notice what is new when they are shown.
+  const bool has_more = hasMoreObjects(state);
+  pushTabPadding();
+  const bool has_tabs = ImGui::BeginTabBar("tabs");
+  ImGui::PopStyleVar();
+  if (has_tabs) {
+    if (const Tab open{"Colour", footer}) drawColour(state, facts, actions);
+    if (const Tab open{"Objects", footer, has_more}) drawObjects(state, facts, actions);
+    if (const Tab open{"View", footer}) drawView(state, actions, facts);
+    if (facts.playback && facts.playback->steps() > 1)
+      if (const Tab open{"Time", footer}) drawTime(actions, *facts.playback);
+    ImGui::EndTabBar();
+  }
   actions.changed |= actions.function_changed;
-  if (const Section open{"Picture", true}) drawPicture(state, actions);
-  if (const Section open{"View", true}) drawView(state, actions, facts);
-  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
-  cuts_.draw(state, actions);
-  if (const Section open{"Markers", false}) drawMarkers(state, actions);
-  if (const Section open{"Detail and memory", false}) drawDetail(state, actions);
-  if (const Section open{"Statistics", false}) drawStatistics(state, facts.shown);
+  drawFooter(actions);
   ImGui::End();
   return actions;
 }
 
-void Panels::drawTime(PanelActions& actions, Playback& playback) {
-  const StepPosition at = playback.position();
-  const double time = cache_.series().timeAt(at);
-  label("step");
-  if (playback.interpolates()) {
-    double place = static_cast<double>(at.step) + at.part;
-    const double first = 0, last = static_cast<double>(playback.steps() - 1);
-    if (ImGui::SliderScalar("##step", ImGuiDataType_Double, &place, &first, &last, "%.2f")) {
-      const double whole = std::floor(std::clamp(place, first, last));
-      actions.time = StepPosition{static_cast<uint64_t>(whole), std::clamp(place, first, last) - whole};
-    }
-  } else {
-    int step = static_cast<int>(at.step);
-    if (ImGui::SliderInt("##step", &step, 0, static_cast<int>(playback.steps() - 1)))
-      actions.time = StepPosition{static_cast<uint64_t>(std::max(0, step))};
+/// Whether something has been added since the frame before, by a menu, a saved view or undo.
+bool Panels::hasMoreObjects(const ViewState& state) {
+  const size_t now = state.surfaces.size() + state.faces.size() + state.isosurfaces.size() +
+                     state.slices.size() + state.clip_planes.size();
+  return now > std::exchange(objects_seen_, now).value_or(now);
+}
+
+void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions& actions) {
+  bool draws_volume = state.drawsVolume();
+  ImGui::BeginDisabled(!state.hasSheets());  // there would be nothing to see
+  if (eye(draws_volume, "volume")) {
+    state.volume = draws_volume;
+    actions.changed = true;
   }
-  nameWidget("step");
-  actions.dragging |= ImGui::IsItemActive();
-  label("time");
-  const Manifest& series = cache_.seriesManifest();
-  const auto date = dateOf(time, {series.time_unit, series.calendar});
-  ImGui::Text("%g %s", time, series.time_unit.c_str());
-  if (date) label("date");
-  if (date) ImGui::TextUnformatted(date->c_str());
+  ImGui::SameLine();
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted("volume");
+  ImGui::EndDisabled();
+  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
+  cuts_.draw(state, actions);
+  std::optional<size_t> seen = state.markers.size();  // a click in the picture unfolds nothing
+  if (const Section open{"Markers", seen, state.markers.size()}) drawMarkers(state, actions);
+}
+
+void Panels::drawTime(PanelActions& actions, Playback& playback) {
   label("steps per second");
   float speed = static_cast<float>(playback.stepsPerSecond());
   if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f")) playback.setStepsPerSecond(speed);
-  commandButton(Command::kPlay, actions, playback.isPlaying() ? "Stop" : "Play");
-  ImGui::SameLine(8.5f * ImGui::GetFontSize());
   bool loops = playback.loops();
   if (option("loop", loops)) playback.setLoop(loops);
   bool backwards = playback.isBackwards();
   if (option("backwards", backwards)) playback.setBackwards(backwards);
   bool interpolates = playback.interpolates();
   if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
+  ImGui::Spacing();
   commandButton(Command::kSaveStepsMovie, actions, "save movie of all steps...");
 }
 
@@ -176,7 +222,36 @@ void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t ste
   }
 }
 
+namespace {
+
+/// Draws how the picture looks around the data.
+void drawSurroundings(ViewState& state, PanelActions& actions) {
+  const float column = 0.5f * ImGui::GetContentRegionAvail().x;
+  heading("Picture");
+  // Not "light" beside "dark", which reads as a choice of two.
+  actions.changed |= ImGui::Checkbox("lighting", &state.lit);
+  nameWidget("light");
+  ImGui::SameLine(column);
+  if (ImGui::Checkbox("dark background", &state.dark)) {
+    state.suitBackground();
+    actions.changed = actions.function_changed = true;
+  }
+  nameWidget("dark");
+  actions.changed |= option("scalar bar", state.annotations.scalar_bar);
+  ImGui::SameLine(column);
+  actions.changed |= option("outline", state.annotations.outline);
+  actions.changed |= option("axes", state.annotations.axes);
+  hint("arrows that show the directions of x, y and z");
+  ImGui::SameLine(column);
+  actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
+  nameWidget("axes grid");
+}
+
+}  // namespace
+
 void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts) {
+  drawSurroundings(state, actions);
+  heading("Camera");
   const bool perspective = state.camera.projection == Projection::kPerspective;
   commandButton(Command::kFit, actions, "fit");
   ImGui::SameLine();
@@ -199,7 +274,11 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
     actions.changed = true;
   }
   ImGui::EndDisabled();
+  heading("Saved views");
   drawSavedViews(actions, facts.views);
+  ImGui::Spacing();
+  if (const Section open{"Detail and memory", false}) drawDetail(state, actions);
+  if (const Section open{"Statistics", false}) drawStatistics(state, facts.shown);
 }
 
 void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string>& views) {
@@ -255,33 +334,12 @@ bool editGradient(std::vector<OpacityPoint>& points) {
 
 }  // namespace
 
-void Panels::drawPicture(ViewState& state, PanelActions& actions) {
-  const float column = 0.5f * ImGui::GetContentRegionAvail().x;
-  // Not "light" beside "dark", which reads as a choice of two.
-  actions.changed |= ImGui::Checkbox("lighting", &state.lit);
-  nameWidget("light");
-  ImGui::SameLine(column);
-  if (ImGui::Checkbox("dark background", &state.dark)) {
-    state.suitBackground();
-    actions.changed = actions.function_changed = true;
-  }
-  nameWidget("dark");
-  actions.changed |= option("scalar bar", state.annotations.scalar_bar);
-  ImGui::SameLine(column);
-  actions.changed |= option("outline", state.annotations.outline);
-  actions.changed |= option("axes", state.annotations.axes);
-  hint("arrows that show the directions of x, y and z");
-  ImGui::SameLine(column);
-  actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
-  nameWidget("axes grid");
+void Panels::drawColour(ViewState& state, const PanelFacts& facts, PanelActions& actions) {
+  drawScalars(state, facts, actions);
+  ImGui::Spacing();
+  drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
+  ImGui::Separator();
   actions.changed |= editGradient(state.gradient_opacity);
-  ImGui::BeginDisabled(!state.hasSheets());  // there would be nothing to see
-  actions.changed |= option("volume", state.volume);
-  ImGui::EndDisabled();
-  commandButton(Command::kSavePicture, actions, "save picture");
-  ImGui::SameLine(column);
-  commandButton(Command::kSaveTurnMovie, actions, "movie once around...");
-  commandButton(Command::kCopyCommand, actions, "copy command");
 }
 
 void Panels::drawDetail(ViewState& state, PanelActions& actions) {

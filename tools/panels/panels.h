@@ -1,9 +1,11 @@
-// The panels beside the picture: time, scalars and their functions, picture, cuts, views, markers,
-// statistics. Nothing in them changes its size while it is used: what does not apply is greyed out. They
-// edit a ViewState, and report everything else as PanelActions. For the window's thread, within a frame;
-// histograms are read on another one.
+// The panels beside the picture, in tabs: Colour (scalars and their functions), Objects (what is drawn and what cuts it),
+// View (camera, what surrounds the data, saved views, detail, statistics) and, of a series, Time. Below them are buttons
+// that save the picture, whichever tab is shown. Nothing changes its size while it is used: what does not apply is
+// greyed out. They edit a ViewState, and report everything else as PanelActions. For the window's thread, within a
+// frame; histograms are read on another one.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,12 +58,14 @@ class Panels {
   PanelActions draw(ViewState& state, const PanelFacts& facts);
 
  private:
+  bool hasMoreObjects(const ViewState& state);
+  void drawColour(ViewState& state, const PanelFacts& facts, PanelActions& actions);
+  void drawObjects(ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawTime(PanelActions& actions, Playback& playback);
   void drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawFunctions(ViewState& state, PanelActions& actions, uint64_t step);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);
-  void drawPicture(ViewState& state, PanelActions& actions);
   void drawDetail(ViewState& state, PanelActions& actions);
 
   const CacheReader& cache_;
@@ -69,6 +73,7 @@ class Panels {
   SurfacePanel surfaces_;
   FunctionPanel function_, opacity_function_;
   std::string view_name_;
+  std::optional<size_t> objects_seen_;  // in the frame before
 };
 
 }  // namespace curvisplat

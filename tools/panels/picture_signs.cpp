@@ -76,8 +76,8 @@ bool PlaneHandles::draw(ViewState& state, const Manifest& manifest, const PlaceI
   bool moved = false;
   size_t number = 0;
   for (auto* planes : {&state.clip_planes, &state.slices})
-    for (ClipPlane& plane : *planes) {
-      moved |= drawOne(plane, number, manifest, place, window);
+    for (ListedPlane& plane : *planes) {
+      if (plane.visible) moved |= drawOne(plane, number, manifest, place, window);
       ++number;
     }
   return moved;

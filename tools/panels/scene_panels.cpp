@@ -45,13 +45,85 @@ std::string coordinateFormat(double coordinate, double lowest, double highest) {
   return fmt::format("%.{}g", 4 + std::clamp(static_cast<int>(further), 0, 4));
 }
 
+/// `name`: of the widget.
+void opacitySlider(const char* text, const std::string& name, double& opacity, PanelActions& actions) {
+  auto value = static_cast<float>(opacity);
+  label(text);
+  if (ImGui::SliderFloat(fmt::format("##{}", name).c_str(), &value, 0.05f, 1, "%.2f",
+                         ImGuiSliderFlags_AlwaysClamp)) {
+    opacity = static_cast<double>(value);
+    actions.changed = true;
+  }
+  actions.dragging |= ImGui::IsItemActive();
+  nameWidget(name);
+}
+
+/// Where a button "remove" at the right end of a line begins.
+float removeFrom() {
+  return ImGui::GetContentRegionMax().x - ImGui::CalcTextSize("remove").x -
+         2 * ImGui::GetStyle().FramePadding.x;
+}
+
+bool removeButton(const std::string& name) {
+  ImGui::SameLine(removeFrom());
+  const bool removes = ImGui::Button("remove");
+  nameWidget("remove " + name);
+  return removes;
+}
+
+/// Draws the line that begins an object: eye, colour, title and a button that removes it. Returns whether that was
+/// pressed.
+bool drawHead(bool& visible, const std::string& title, glm::vec3* colour, const std::string& name,
+              PanelActions& actions) {
+  ImGui::Separator();
+  actions.changed |= eye(visible, name);
+  ImGui::SameLine();
+  if (colour) {
+    actions.changed |= ImGui::ColorEdit3("##colour", glm::value_ptr(*colour), ImGuiColorEditFlags_NoInputs);
+    actions.dragging |= ImGui::IsItemActive();
+    nameWidget("colour of " + name);
+    ImGui::SameLine();
+  }
+  ImGui::AlignTextToFramePadding();
+  const ImVec2 from = ImGui::GetCursorScreenPos();
+  // A long name ends before the button.
+  ImGui::PushClipRect(from,
+                      {ImGui::GetWindowPos().x + removeFrom() - ImGui::GetStyle().ItemSpacing.x,
+                       from.y + 2 * ImGui::GetFrameHeight()},
+                      true);
+  ImGui::TextColored(ImGui::GetStyleColorVec4(visible ? ImGuiCol_Text : ImGuiCol_TextDisabled), "%s",
+                     title.c_str());
+  ImGui::PopClipRect();
+  hint(title.c_str());
+  return removeButton(name);
+}
+
+void addButton(Command command, bool has_room, PanelActions& actions) {
+  ImGui::BeginDisabled(!has_room);
+  commandButton(command, actions);
+  ImGui::EndDisabled();
+}
+
+template <typename List>
+void removeAt(List& list, size_t at, PanelActions& actions) {
+  if (at >= list.size()) return;
+  list.erase(list.begin() + static_cast<ptrdiff_t>(at));
+  actions.changed = true;
+}
+
 }  // namespace
 
 void CutPanel::draw(ViewState& state, PanelActions& actions) {
+  if (const Section open{"Slices", slices_seen_, state.slices.size()}) {
+    addButton(Command::kAddSlice, state.slices.size() < kMaxSlices, actions);
+    drawSliceOpacity(state, actions);
+    drawPlanes(state.slices, state, actions);
+  }
+  if (const Section open{"Clip planes", planes_seen_, state.clip_planes.size()}) {
+    addButton(Command::kAddClipPlane, state.clip_planes.size() < kMaxClipPlanes, actions);
+    drawPlanes(state.clip_planes, state, actions);
+  }
   if (const Section open{"Clip box", false}) drawClipBox(state, actions);
-  if (const Section open{"Clip planes", planes_seen_, state.clip_planes.size()})
-    drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
-  if (const Section open{"Slices", slices_seen_, state.slices.size()}) drawSlices(state, actions);
 }
 
 /// A plane's normal in data coordinates is its normal after --scale, times the scale.
@@ -98,71 +170,64 @@ void CutPanel::drawClipBox(ViewState& state, PanelActions& actions) {
   ImGui::EndDisabled();
 }
 
-/// Each plane has a direction and a place along it, which can also be dragged in the picture.
-void CutPanel::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state,
-                          PanelActions& actions) {
+void CutPanel::drawPlanes(std::vector<ListedPlane>& planes, const ViewState& state, PanelActions& actions) {
+  const bool clips = &planes == &state.clip_planes;
+  size_t removed = planes.size();
+  for (size_t n = 0; n < planes.size(); ++n) {
+    ImGui::PushID(static_cast<int>(n));
+    const std::string name = fmt::format("{} {}", clips ? "clip plane" : "slice", n + 1);
+    if (drawHead(planes[n].visible, name, nullptr, name, actions)) removed = n;
+    drawPlane(planes[n], name, state, actions);
+    ImGui::PopID();
+  }
+  removeAt(planes, removed, actions);
+}
+
+/// A plane has a direction and a place along it, which can also be dragged in the picture.
+void CutPanel::drawPlane(ListedPlane& plane, const std::string& name, const ViewState& state,
+                         PanelActions& actions) {
   const Manifest& manifest = cache_.manifest();
   const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
   const glm::dvec3 half = 0.5 * (manifest.upper - manifest.lower);
-  const bool clips = &planes == &state.clip_planes;
-  ImGui::PushID(&planes);
-  ImGui::BeginDisabled(planes.size() >= most);
-  commandButton(clips ? Command::kAddClipPlane : Command::kAddSlice, actions);
-  ImGui::EndDisabled();
-  size_t removed = planes.size();
-  for (size_t n = 0; n < planes.size(); ++n) {
-    ClipPlane& plane = planes[n];
-    ImGui::PushID(static_cast<int>(n));
-    ImGui::Separator();
-    const std::string name = fmt::format("{} {}", clips ? "clip plane" : "slice", n + 1);
-    const auto turn = [&](const char* label, const glm::dvec3& normal) {
-      const bool turns = ImGui::Button(label);
-      nameWidget(fmt::format("{} {}", label, name));
-      if (!turns) return;
-      plane.normal = normal;
-      actions.changed = true;
-    };
-    turn("x", {1, 0, 0});
+  const auto turn = [&](const char* text, const glm::dvec3& normal) {
+    const bool turns = ImGui::Button(text);
+    nameWidget(fmt::format("{} {}", text, name));
+    if (!turns) return;
+    plane.normal = normal;
+    actions.changed = true;
+  };
+  label("across");
+  turn("x", {1, 0, 0});
+  ImGui::SameLine();
+  turn("y", {0, 1, 0});
+  ImGui::SameLine();
+  turn("z", {0, 0, 1});
+  ImGui::SameLine();
+  turn("view", planeBeforeViewer(manifest, state).normal);
+  hint("facing you");
+  if (name.starts_with("clip")) {
     ImGui::SameLine();
-    turn("y", {0, 1, 0});
-    ImGui::SameLine();
-    turn("z", {0, 0, 1});
-    ImGui::SameLine();
-    turn("view", planeBeforeViewer(manifest, state).normal);
-    hint("facing you");
-    ImGui::SameLine();
-    if (clips) {
-      turn("flip", -plane.normal);
-      hint("keep the other side");
-      ImGui::SameLine();
-    }
-    if (ImGui::Button("remove")) removed = n;
-    nameWidget("remove " + name);
-    // From the data's one end along the normal to the other; a plane across an axis has its coordinate
-    // there.
-    const PlaneScale scale = planeScaleOf(plane.normal);
-    const double centre = glm::dot(scale.along, middle), reach = glm::dot(half, glm::abs(scale.along));
-    const double lowest = centre - reach, highest = centre + reach;
-    double place = glm::dot(scale.along, plane.point);
-    label(fmt::format("{} {}", scale.name, n + 1).c_str());
-    if (ImGui::SliderScalar("##place", ImGuiDataType_Double, &place, &lowest, &highest,
-                            coordinateFormat(place, lowest, highest).c_str())) {
-      plane.point = middle + (place - centre) * scale.along;
-      actions.changed = true;
-    }
-    actions.dragging |= ImGui::IsItemActive();
-    nameWidget(name);
-    nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
-    hint("Ctrl + click to type a number");
-    ImGui::PopID();
+    turn("flip", -plane.normal);
+    hint("keep the other side");
   }
-  ImGui::PopID();
-  if (removed == planes.size()) return;
-  planes.erase(planes.begin() + static_cast<ptrdiff_t>(removed));
-  actions.changed = true;
+  // From the data's one end along the normal to the other; a plane across an axis has its coordinate there.
+  const PlaneScale scale = planeScaleOf(plane.normal);
+  const double centre = glm::dot(scale.along, middle), reach = glm::dot(half, glm::abs(scale.along));
+  const double lowest = centre - reach, highest = centre + reach;
+  double place = glm::dot(scale.along, plane.point);
+  label(scale.name);
+  if (ImGui::SliderScalar("##place", ImGuiDataType_Double, &place, &lowest, &highest,
+                          coordinateFormat(place, lowest, highest).c_str())) {
+    plane.point = middle + (place - centre) * scale.along;
+    actions.changed = true;
+  }
+  actions.dragging |= ImGui::IsItemActive();
+  nameWidget(name);
+  nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
+  hint("drag it here or in the picture; Ctrl + click to type a number");
 }
 
-void CutPanel::drawSlices(ViewState& state, PanelActions& actions) {
+void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
   auto opacity = static_cast<float>(state.slice_opacity.factor);
   label("opacity");
   if (ImGui::SliderFloat("##opacity", &opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
@@ -172,64 +237,12 @@ void CutPanel::drawSlices(ViewState& state, PanelActions& actions) {
   actions.dragging |= ImGui::IsItemActive();
   actions.changed |= ImGui::Checkbox("times the function's", &state.slice_opacity.by_function);
   nameWidget("slices by function");
-  drawPlanes(state.slices, kMaxSlices, state, actions);
 }
-
-namespace {
-
-/// `name`: of the widget.
-void opacitySlider(const char* text, const std::string& name, double& opacity, PanelActions& actions) {
-  auto value = static_cast<float>(opacity);
-  label(text);
-  if (ImGui::SliderFloat(fmt::format("##{}", name).c_str(), &value, 0.05f, 1, "%.2f",
-                         ImGuiSliderFlags_AlwaysClamp)) {
-    opacity = static_cast<double>(value);
-    actions.changed = true;
-  }
-  actions.dragging |= ImGui::IsItemActive();
-  nameWidget(name);
-}
-
-/// Title, colour and a button that removes it, in a line; whether it was pressed.
-bool drawHead(const std::string& title, glm::vec3* colour, const std::string& name, PanelActions& actions) {
-  ImGui::Separator();
-  if (colour) {
-    actions.changed |= ImGui::ColorEdit3("##colour", glm::value_ptr(*colour), ImGuiColorEditFlags_NoInputs);
-    actions.dragging |= ImGui::IsItemActive();
-    nameWidget("colour of " + name);
-    ImGui::SameLine();
-  }
-  ImGui::AlignTextToFramePadding();
-  const float button = ImGui::CalcTextSize("remove").x + 2 * ImGui::GetStyle().FramePadding.x;
-  const float right = ImGui::GetContentRegionMax().x - button;
-  const ImVec2 from = ImGui::GetCursorScreenPos();
-  // A long name ends before the button.
-  ImGui::PushClipRect(from,
-                      {ImGui::GetWindowPos().x + right - ImGui::GetStyle().ItemSpacing.x,
-                       from.y + 2 * ImGui::GetFrameHeight()},
-                      true);
-  ImGui::TextUnformatted(title.c_str());
-  ImGui::PopClipRect();
-  hint(title.c_str());
-  ImGui::SameLine(right);
-  const bool removes = ImGui::Button("remove");
-  nameWidget("remove " + name);
-  return removes;
-}
-
-template <typename List>
-void removeAt(List& list, size_t at, PanelActions& actions) {
-  if (at >= list.size()) return;
-  list.erase(list.begin() + static_cast<ptrdiff_t>(at));
-  actions.changed = true;
-}
-
-}  // namespace
 
 void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions) {
   if (const Section open{"Surfaces", surfaces_seen_, state.surfaces.size() + state.faces.size()})
     drawSurfaces(state, faces, actions);
-  if (const Section open{"Isosurfaces", isovalues_seen_, state.isovalues.size()})
+  if (const Section open{"Isosurfaces", isosurfaces_seen_, state.isosurfaces.size()})
     drawIsosurfaces(state, actions);
 }
 
@@ -261,7 +274,8 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
     ImGui::PushID(static_cast<int>(n));
     // With a scalar its colour is not seen.
     const std::string name = fmt::format("surface {}", n + 1);
-    if (drawHead(named.name, state.faces_by ? nullptr : &named.colour, name, actions)) removed = n;
+    if (drawHead(named.visible, named.name, state.faces_by ? nullptr : &named.colour, name, actions))
+      removed = n;
     opacitySlider("opacity", "opacity of " + name, named.opacity.factor, actions);
     ImGui::BeginDisabled(!state.faces_by && !state.opacity_by);
     actions.changed |= ImGui::Checkbox("times the function's", &named.opacity.by_function);
@@ -276,7 +290,8 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
     ImGui::PushID(surface.path.c_str());
     ImGui::PushID(static_cast<int>(n));
     const std::string name = fmt::format("surface file {}", n + 1);
-    if (drawHead(surface.path.filename().string(), &surface.colour, name, actions)) removed = n;
+    if (drawHead(surface.visible, surface.path.filename().string(), &surface.colour, name, actions))
+      removed = n;
     opacitySlider("opacity", "opacity of " + name, surface.opacity, actions);
     ImGui::PopID();
     ImGui::PopID();
@@ -306,29 +321,68 @@ void SurfacePanel::drawColouring(const ViewState& state, PanelActions& actions) 
 }
 
 void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
-  const VariableInfo& info = cache_.manifest().variables[cache_.variableNamed(state.isoScalar())];
   commandButton(Command::kAddIsosurface, actions);
-  ImGui::BeginDisabled(state.isovalues.empty());
+  ImGui::BeginDisabled(state.isosurfaces.empty());
   opacitySlider("opacity", "opacity of isosurfaces", state.iso_opacity.factor, actions);
+  ImGui::BeginDisabled(state.hasIsosurfacesOfThird());
   actions.changed |= ImGui::Checkbox("times the function's", &state.iso_opacity.by_function);
   nameWidget("isosurfaces by function");
   ImGui::EndDisabled();
-  size_t removed = state.isovalues.size();
-  for (size_t n = 0; n < state.isovalues.size(); ++n) {
+  ImGui::EndDisabled();
+  size_t removed = state.isosurfaces.size();
+  for (size_t n = 0; n < state.isosurfaces.size(); ++n) {
+    Isosurface& one = state.isosurfaces[n];
     ImGui::PushID(static_cast<int>(n));
+    ImGui::Separator();
     const std::string name = fmt::format("isosurface {}", n + 1);
-    const std::string title = fmt::format("{} at", scalarTitle(info.name, info.unit));
-    if (drawHead(title, nullptr, name, actions)) removed = n;
-    ImGui::SetNextItemWidth(-1);
-    if (ImGui::SliderScalar("##value", ImGuiDataType_Double, &state.isovalues[n], &info.min, &info.max,
-                            "%.5g", ImGuiSliderFlags_AlwaysClamp))
-      actions.changed = true;
-    actions.dragging |= ImGui::IsItemActive();
-    nameWidget(name);
-    hint("Ctrl + click to type a number");
+    actions.changed |= eye(one.visible, name);
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(removeFrom() - ImGui::GetStyle().ItemSpacing.x - ImGui::GetCursorPosX());
+    chooseScalarOf(one, name, actions);
+    if (removeButton(name)) removed = n;
+    drawValueOf(one, name, actions);
+    if (one.visible && one.scalar != state.isoScalar()) {
+      ImGui::TextDisabled("drawn when the picture or its opacities show it");
+      nameWidget(name + " is not drawn");
+      hint(
+          "one scalar's isosurfaces are drawn at a time: that of the opacities, or of the colours;\n"
+          "without the volume, any scalar's");
+    }
     ImGui::PopID();
   }
-  removeAt(state.isovalues, removed, actions);
+  removeAt(state.isosurfaces, removed, actions);
+}
+
+/// Each has a scalar of its own, which need not be the one that the picture shows.
+void SurfacePanel::chooseScalarOf(Isosurface& one, const std::string& name, PanelActions& actions) {
+  if (!ImGui::BeginCombo("##scalar", one.scalar.c_str(), ImGuiComboFlags_HeightLarge))
+    return nameWidget("scalar of " + name);
+  for (const VariableInfo& info : cache_.manifest().variables) {
+    const bool chooses =
+        ImGui::Selectable(scalarTitle(info.name, info.unit).c_str(), info.name == one.scalar);
+    nameWidget(fmt::format("{} by {}", name, info.name));
+    if (!chooses || info.name == one.scalar) continue;
+    one.scalar = info.name;
+    one.value = 0.5 * (info.min + info.max);
+    actions.changed = true;
+  }
+  ImGui::EndCombo();
+}
+
+void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions) {
+  const std::vector<VariableInfo>& all = cache_.manifest().variables;
+  const auto info = std::ranges::find(all, one.scalar, &VariableInfo::name);
+  const double lowest = info == all.end() ? one.value : info->min;
+  const double highest = info == all.end() ? one.value : info->max;
+  label("value");
+  ImGui::BeginDisabled(info == all.end());
+  if (ImGui::SliderScalar("##value", ImGuiDataType_Double, &one.value, &lowest, &highest, "%.5g",
+                          ImGuiSliderFlags_AlwaysClamp))
+    actions.changed = true;
+  ImGui::EndDisabled();
+  actions.dragging |= ImGui::IsItemActive();
+  nameWidget(name);
+  hint("Ctrl + click to type a number");
 }
 
 }  // namespace curvisplat

@@ -22,8 +22,9 @@ class CutPanel {
 
  private:
   void drawClipBox(ViewState& state, PanelActions& actions);
-  void drawSlices(ViewState& state, PanelActions& actions);
-  void drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state, PanelActions& actions);
+  static void drawSliceOpacity(ViewState& state, PanelActions& actions);
+  void drawPlanes(std::vector<ListedPlane>& planes, const ViewState& state, PanelActions& actions);
+  void drawPlane(ListedPlane& plane, const std::string& name, const ViewState& state, PanelActions& actions);
 
   const CacheReader& cache_;
   std::optional<size_t> planes_seen_, slices_seen_;  // in the frame before
@@ -43,9 +44,11 @@ class SurfacePanel {
   void drawSurfaces(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions);
   void drawColouring(const ViewState& state, PanelActions& actions);
   void drawIsosurfaces(ViewState& state, PanelActions& actions);
+  void chooseScalarOf(Isosurface& one, const std::string& name, PanelActions& actions);
+  void drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions);
 
   const CacheReader& cache_;
-  std::optional<size_t> surfaces_seen_, isovalues_seen_;  // in the frame before
+  std::optional<size_t> surfaces_seen_, isosurfaces_seen_;  // in the frame before
 };
 
 }  // namespace curvisplat

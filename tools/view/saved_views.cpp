@@ -227,30 +227,39 @@ std::string text(const SheetOpacity& opacity) {
 /// Adds an option for each surface, if any is not opaque.
 void addSurfaceOpacities(const ViewState& state, CommandLine& words) {
   std::vector<SheetOpacity> opacities;
-  for (const SurfaceFile& surface : state.surfaces) opacities.push_back({surface.opacity});
-  for (const NamedFaces& named : state.faces) opacities.push_back(state.opacityOf(named));
+  for (const SurfaceFile& surface : state.surfaces)
+    if (surface.visible) opacities.push_back({surface.opacity});
+  for (const NamedFaces& named : state.faces)
+    if (named.visible) opacities.push_back(state.opacityOf(named));
   if (std::all_of(opacities.begin(), opacities.end(), [](const SheetOpacity& one) { return one.opaque(); }))
     return;
   for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
 }
 
+/// What is hidden is left out.
 void addSurfaces(const ViewState& state, CommandLine& words) {
-  const auto add_colour = [&](const glm::vec3& colour) {
+  std::vector<std::string> colours;
+  const auto add = [&](const std::string& name, const glm::vec3& colour) {
     const glm::ivec3 rgb(255.0f * colour + 0.5f);
-    words.add("--surface-colour", fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
+    words.add("--surface", name);
+    colours.push_back(fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
   };
-  for (const SurfaceFile& surface : state.surfaces) words.add("--surface", shortPath(surface.path).string());
-  for (const NamedFaces& named : state.faces) words.add("--surface", named.name);
-  for (const SurfaceFile& surface : state.surfaces) add_colour(surface.colour);
-  for (const NamedFaces& named : state.faces) add_colour(named.colour);
+  for (const SurfaceFile& surface : state.surfaces)
+    if (surface.visible) add(shortPath(surface.path).string(), surface.colour);
+  for (const NamedFaces& named : state.faces)
+    if (named.visible) add(named.name, named.colour);
+  for (const std::string& colour : colours) words.add("--surface-colour", colour);
   addSurfaceOpacities(state, words);
-  if (state.faces_by && !state.faces.empty()) words.add("--surface-by", state.faces_by->variable);
-  for (const ClipPlane& plane : state.slices) words.add("--slice", text(plane));
-  if (!state.slice_opacity.opaque() && !state.slices.empty())
-    words.add("--slice-opacity", text(state.slice_opacity));
-  if (!state.isovalues.empty()) {
-    words.add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
-    if (!state.iso_opacity.opaque()) words.add("--iso-opacity", text(state.iso_opacity));
+  if (state.faces_by && !state.faceNames().faces.empty()) words.add("--surface-by", state.faces_by->variable);
+  const auto scene = state.frameOptions({1, 1}).scene;
+  if (!scene) return;
+  for (const ClipPlane& plane : scene->slices) words.add("--slice", text(plane));
+  const SheetOpacity of_slices{scene->slice_opacity, scene->slices_by_function};
+  if (!of_slices.opaque() && !scene->slices.empty()) words.add("--slice-opacity", text(of_slices));
+  if (!scene->isovalues.empty()) {
+    words.add("--iso", fmt::format("{}", fmt::join(scene->isovalues, ",")));
+    if (state.isoScalar() != state.opacityScalar()) words.add("--iso-by", state.isoScalar());
+    if (!scene->iso_opacity.opaque()) words.add("--iso-opacity", text(scene->iso_opacity));
   }
   if (!state.drawsVolume()) words.add("--volume", "off");
 }
@@ -294,7 +303,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
     words.add("--clip-box", fmt::format("{},{},{},{},{},{}", part(lower.x), part(upper.x), part(lower.y),
                                         part(upper.y), part(lower.z), part(upper.z)));
   }
-  for (const ClipPlane& plane : state.clip_planes) words.add("--clip-plane", text(plane));
+  for (const ClipPlane& plane : visiblePlanes(state.clip_planes)) words.add("--clip-plane", text(plane));
   if (state.lit) words.add("--shade");
   if (!state.gradient_opacity.empty()) words.add("--gradient-opacity", textOf(state.gradient_opacity));
   addSurfaces(state, words);

@@ -28,20 +28,27 @@ Json jsonOf(const glm::dvec3& point) {
   return {point.x, point.y, point.z};
 }
 
-Json jsonOf(const std::vector<ClipPlane>& planes) {
+Json jsonOf(const std::vector<ListedPlane>& planes) {
   Json json = Json::array();
-  for (const ClipPlane& plane : planes)
-    json.push_back({{"point", jsonOf(plane.point)}, {"normal", jsonOf(plane.normal)}});
+  for (const ListedPlane& plane : planes)
+    json.push_back(
+        {{"point", jsonOf(plane.point)}, {"normal", jsonOf(plane.normal)}, {"visible", plane.visible}});
   return json;
 }
 
+/// States of earlier versions have nothing that is hidden.
+bool visibleFrom(const JsonField& fields) {
+  const auto visible = fields.find("visible");
+  return !visible || visible->flag();
+}
+
 /// Reads clip planes, at most `most`; states of earlier versions have none.
-std::vector<ClipPlane> planesFrom(const JsonField& fields, const char* name, size_t most) {
-  std::vector<ClipPlane> planes;
+std::vector<ListedPlane> planesFrom(const JsonField& fields, const char* name, size_t most) {
+  std::vector<ListedPlane> planes;
   const auto list = fields.find(name);
   if (!list) return planes;
   for (const JsonField& entry : list->elements(most)) {
-    planes.push_back({entry.at("point").point(), entry.at("normal").point()});
+    planes.push_back({{entry.at("point").point(), entry.at("normal").point()}, visibleFrom(entry)});
     if (!isUsable(planes.back())) entry.at("normal").fail("a direction");
   }
   return planes;
@@ -149,13 +156,15 @@ void putSurfaces(Json& json, const ViewState& state) {
   for (const SurfaceFile& surface : state.surfaces)
     json["surfaces"].push_back({{"file", surface.path.string()},
                                 {"colour", jsonOf(glm::dvec3(surface.colour))},
-                                {"opacity", surface.opacity}});
+                                {"opacity", surface.opacity},
+                                {"visible", surface.visible}});
   json["faces"] = Json::array();
   for (const NamedFaces& named : state.faces)
     json["faces"].push_back({{"name", named.name},
                              {"colour", jsonOf(glm::dvec3(named.colour))},
                              {"opacity", named.opacity.factor},
-                             {"by_function", named.opacity.by_function}});
+                             {"by_function", named.opacity.by_function},
+                             {"visible", named.visible}});
   json["faces_by"] = nullptr;
   if (state.faces_by) {
     json["faces_by"] = {{"variable", state.faces_by->variable}};
@@ -164,7 +173,10 @@ void putSurfaces(Json& json, const ViewState& state) {
   json["slices"] = jsonOf(state.slices);
   json["slice_opacity"] = state.slice_opacity.factor;
   json["slices_by_function"] = state.slice_opacity.by_function;
-  json["isovalues"] = state.isovalues;
+  json["isovalues"] = state.isovalues();  // those that are drawn, for readers of earlier versions
+  json["isosurfaces"] = Json::array();
+  for (const Isosurface& one : state.isosurfaces)
+    json["isosurfaces"].push_back({{"scalar", one.scalar}, {"value", one.value}, {"visible", one.visible}});
   json["iso_opacity"] = state.iso_opacity.factor;
   json["isosurfaces_by_function"] = state.iso_opacity.by_function;
   json["volume"] = state.volume;
@@ -213,6 +225,11 @@ double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
   return diagonal > 0 ? diagonal / 100 : 1;
 }
 
+/// Hides isosurfaces of scalars that the cache lacks.
+void hideOthers(std::vector<Isosurface>& isosurfaces, const Manifest& manifest) {
+  for (Isosurface& one : isosurfaces) one.visible &= find(manifest, one.scalar) != nullptr;
+}
+
 /// States of earlier versions lack some.
 void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, const Manifest& manifest,
                   ViewState& state) {
@@ -221,12 +238,14 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
       SurfaceFile& file = state.surfaces.emplace_back(
           SurfaceFile{surface.at("file").text(), colourFrom(surface.at("colour"))});
       if (const auto opacity = surface.find("opacity")) file.opacity = opacity->number(1e-3, 1);
+      file.visible = visibleFrom(surface);
     }
   if (const auto faces = fields.find("faces"))
     for (const JsonField& named : faces->elements(kMaxSurfaces))
       state.faces.push_back({named.at("name").text(),
                              colourFrom(named.at("colour")),
-                             {named.at("opacity").number(1e-3, 1), named.at("by_function").flag()}});
+                             {named.at("opacity").number(1e-3, 1), named.at("by_function").flag()},
+                             visibleFrom(named)});
   if (const auto by = fields.find("faces_by")) {
     const JsonField variable = by->at("variable");
     if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
@@ -237,15 +256,53 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
   if (const auto opacity = fields.find("slice_opacity"))
     state.slice_opacity.factor = opacity->number(1e-3, 1);
   if (const auto by = fields.find("slices_by_function")) state.slice_opacity.by_function = by->flag();
-  if (const auto values = fields.find("isovalues"))
+  if (const auto isosurfaces = fields.find("isosurfaces")) {
+    for (const JsonField& one : isosurfaces->elements(kMaxIsovalues))
+      state.isosurfaces.push_back(
+          {one.at("scalar").text(), one.at("value").number(-1e300, 1e300), visibleFrom(one)});
+  } else if (const auto values = fields.find("isovalues")) {  // earlier versions had those of one scalar
     for (const JsonField& value : values->elements(kMaxIsovalues))
-      state.isovalues.push_back(value.number(-1e300, 1e300));
+      state.isosurfaces.push_back({state.opacityScalar(), value.number(-1e300, 1e300)});
+  }
+  hideOthers(state.isosurfaces, manifest);
   if (const auto opacity = fields.find("iso_opacity")) state.iso_opacity.factor = opacity->number(1e-3, 1);
   if (const auto by = fields.find("isosurfaces_by_function")) state.iso_opacity.by_function = by->flag();
   if (const auto volume = fields.find("volume")) state.volume = volume->flag();
 }
 
 }  // namespace
+
+const std::string& ViewState::isoScalar() const {
+  const auto shows = [this](const std::string& scalar) {
+    return std::ranges::any_of(isosurfaces,
+                               [&](const Isosurface& one) { return one.visible && one.scalar == scalar; });
+  };
+  if (shows(opacityScalar())) return opacityScalar();
+  if (opacity_by || shows(variable)) return variable;
+  const auto other = std::ranges::find(isosurfaces, true, &Isosurface::visible);
+  return volume || other == isosurfaces.end() ? variable : other->scalar;
+}
+
+std::vector<double> ViewState::isovalues() const {
+  std::vector<double> values;
+  for (const Isosurface& one : isosurfaces)
+    if (one.visible && one.scalar == isoScalar()) values.push_back(one.value);
+  return values;
+}
+
+bool ViewState::hasIsosurfacesOfThird() const {
+  return isoScalar() != variable && isoScalar() != opacityScalar();
+}
+
+bool ViewState::hasSheets() const {
+  const auto has_visible = [](const auto& list) {
+    return std::ranges::any_of(list, [](const auto& one) { return one.visible; });
+  };
+  const bool has_isosurfaces = std::ranges::any_of(isosurfaces, [this](const Isosurface& one) {
+    return one.visible && (!opacity_by || one.scalar == variable || one.scalar == opacity_by->variable);
+  });
+  return has_isosurfaces || has_visible(surfaces) || has_visible(faces) || has_visible(slices);
+}
 
 SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
   return {named.opacity.factor, named.opacity.by_function && (faces_by || opacity_by)};
@@ -254,11 +311,19 @@ SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
 FaceNames ViewState::faceNames() const {
   FaceNames names{{}, faces_by ? faces_by->variable : "", ""};
   for (const NamedFaces& named : faces) {
+    if (!named.visible) continue;
     const bool has_opacities = named.opacity.by_function && opacity_by && opacity_by->variable != variable;
     names.faces.push_back({named.name, has_opacities});
     if (has_opacities) names.opacity_by = opacity_by->variable;
   }
   return names;
+}
+
+std::vector<ClipPlane> visiblePlanes(const std::vector<ListedPlane>& planes) {
+  std::vector<ClipPlane> visible;
+  for (const ListedPlane& plane : planes)
+    if (plane.visible) visible.push_back(plane);
+  return visible;
 }
 
 FrameOptions ViewState::frameOptions(ImageSize size) const {
@@ -268,13 +333,13 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.lod_pixels = lod_pixels;
   options.scale = scale;
   options.clip_box = clip_box;
-  options.clip_planes = clip_planes;
+  options.clip_planes = visiblePlanes(clip_planes);
   if (lit) options.light = Light{};
   options.gradient_opacity = gradient_opacity;
   if (hasSheets()) {
     auto scene = std::make_shared<SurfaceScene>();
     for (const SurfaceFile& surface : surfaces)
-      if (surface.mesh)
+      if (surface.mesh && surface.visible)
         scene->surfaces.push_back({surface.mesh, surface.colour, false, nullptr, {surface.opacity}});
     std::shared_ptr<const TransferFunction> of_faces;
     std::shared_ptr<const ColourTable> colours;  // none: the picture's
@@ -283,17 +348,21 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
       colours = std::make_shared<ColourTable>(*of_faces);
     }
     for (const NamedFaces& named : faces) {
+      if (!named.visible) continue;
       GridSurface& surface = scene->grid_surfaces.emplace_back();
       surface.colour = named.colour;
       surface.opacity = opacityOf(named);
       surface.function = of_faces;
       surface.colours = colours;
     }
-    scene->slices = slices;
+    scene->slices = visiblePlanes(slices);
     scene->slice_opacity = slice_opacity.factor;
-    scene->slices_by_function = slice_opacity.by_function;
-    scene->isovalues = isovalues;
+    scene->isovalues = isovalues();
+    scene->iso_of_colours = opacity_by && isoScalar() == variable;
     scene->iso_opacity = iso_opacity;
+    // The picture's function has no opacities for a third scalar.
+    scene->slices_by_function = slice_opacity.by_function && !hasIsosurfacesOfThird();
+    scene->iso_opacity.by_function &= !hasIsosurfacesOfThird();
     scene->volume = volume;
     options.scene = std::move(scene);
   }
@@ -338,9 +407,9 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
 }
 
 void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown) {
-  if (!find(manifest, state.isoScalar())) state.isovalues.clear();  // they were at its values
   if (state.opacity_by && !find(manifest, state.opacity_by->variable)) state.opacity_by.reset();
   if (state.faces_by && !find(manifest, state.faces_by->variable)) state.faces_by.reset();
+  hideOthers(state.isosurfaces, manifest);
   if (!find(manifest, state.variable)) chooseVariable(state, manifest, shown);
 }
 
@@ -397,7 +466,6 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   state.scale = factors;
   if (const auto box = fields.find("clip_box")) state.clip_box = boxFrom(*box);
   state.clip_planes = planesFrom(fields, "clip_planes", kMaxClipPlanes);
-  takeSurfaces(fields, path, manifest, state);
   if (const auto lit = fields.find("lit")) state.lit = lit->flag();
   if (const auto gradient = fields.find("gradient_opacity"); gradient && !gradient->text().empty())
     state.gradient_opacity = opacitiesFrom(*gradient);
@@ -410,6 +478,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
     state.opacity_by =
         OpacityScalar{by.text(), functionFrom(*opacity, path, defaultOpacityUnit(manifest, factors))};
   }
+  takeSurfaces(fields, path, manifest, state);
   if (const auto markers = fields.find("markers"))
     for (const JsonField& marker : markers->elements(kMaxMarkers))
       state.markers.push_back(markerFrom(marker));

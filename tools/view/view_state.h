@@ -29,6 +29,7 @@ struct SurfaceFile {
   glm::vec3 colour{0.7f, 0.7f, 0.7f};
   std::shared_ptr<const TriangleMesh> mesh = nullptr;
   double opacity = 1;
+  bool visible = true;
 };
 
 /// Faces of the grid, by a name that --surface takes.
@@ -36,6 +37,18 @@ struct NamedFaces {
   std::string name;
   glm::vec3 colour{0.7f, 0.7f, 0.7f};
   SheetOpacity opacity = {};
+  bool visible = true;
+};
+
+/// A clip plane or a slice.
+struct ListedPlane : ClipPlane {
+  bool visible = true;
+};
+
+struct Isosurface {
+  std::string scalar;
+  double value = 0;
+  bool visible = true;
 };
 
 /// The scalar that colours the grid's faces, and the function that gives them colours where the picture
@@ -70,13 +83,13 @@ struct ViewState {
   Classification classification = Classification::kPixel;
   glm::dvec3 scale{1.0};
   std::optional<WorldBox> clip_box = std::nullopt;
-  std::vector<ClipPlane> clip_planes = {};
+  std::vector<ListedPlane> clip_planes = {};
   std::vector<SurfaceFile> surfaces = {};
   std::vector<NamedFaces> faces = {};
   std::optional<FacesScalar> faces_by = std::nullopt;  // none: each has its colour
-  std::vector<ClipPlane> slices = {};
+  std::vector<ListedPlane> slices = {};
   SheetOpacity slice_opacity = {};
-  std::vector<double> isovalues = {};  // of isoScalar()
+  std::vector<Isosurface> isosurfaces = {};
   SheetOpacity iso_opacity = {};
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
@@ -89,12 +102,16 @@ struct ViewState {
   glm::vec4 background() const { return dark ? kDefaultBackground : glm::vec4(1); }
   /// Suits all functions to the background (EditedFunction::suitBackground()).
   void suitBackground();
-  /// The scalar of isosurfaces and of opacities.
-  const std::string& isoScalar() const { return opacity_by ? opacity_by->variable : variable; }
-  /// Whether there is anything but the volume.
-  bool hasSheets() const {
-    return !(surfaces.empty() && faces.empty() && slices.empty() && isovalues.empty());
-  }
+  const std::string& opacityScalar() const { return opacity_by ? opacity_by->variable : variable; }
+  /// The scalar whose isosurfaces are drawn: that of the opacities if there are any of it, otherwise that of the colours.
+  /// Without the volume, another one where it alone has isosurfaces.
+  const std::string& isoScalar() const;
+  /// The values of the isosurfaces that are drawn, all of isoScalar().
+  std::vector<double> isovalues() const;
+  /// Whether the isosurfaces are of a scalar that gives neither colours nor opacities.
+  bool hasIsosurfacesOfThird() const;
+  /// Whether anything but the volume is drawn, or would be without it.
+  bool hasSheets() const;
   /// Whether the volume is drawn: always if there is nothing else, whatever `volume` says.
   bool drawsVolume() const { return volume || !hasSheets(); }
   /// The opacity of faces as they are drawn: without a scalar there is no function.
@@ -103,6 +120,9 @@ struct ViewState {
   /// The options of a frame whose grid surfaces have their look; their faces are found by faceNames().
   FrameOptions frameOptions(ImageSize size) const;
 };
+
+/// Those that are not hidden.
+std::vector<ClipPlane> visiblePlanes(const std::vector<ListedPlane>& planes);
 
 /// The initial state without a look at the data: the first scalar that varies with a preset, and the data
 /// fitted into the picture beside the scalar bar. Throws Error if the cache has no scalar.
@@ -114,8 +134,8 @@ void loadSurfaces(ViewState& state);
 /// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the
 /// scalars if there is none of this name.
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name);
-/// Removes opacities, isosurfaces and colours of faces by scalars that a cache does not have: `manifest` is of another
-/// cache of the same grid, which is shown next. `shown`: the scalar that is shown if the present one is not there.
+/// Removes opacities and colours of faces by scalars that a cache does not have, and hides isosurfaces of them: `manifest`
+/// is of another cache of the same grid, which is shown next. `shown`: the scalar that is shown if the present one is not there.
 void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown);
 
 std::string toJson(const ViewState& state);

@@ -10,6 +10,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "tools/panels/time_bar.h"
 #include "tools/view/first_view.h"
 #include "tools/view/picture_layout.h"
 #include "tools/view/saved_views.h"
@@ -241,13 +242,16 @@ void CacheView::annotate() {
 /// Applies mouse, panels and playback.
 void CacheView::react(const WindowLayout& layout) {
   changed_ |= navigation_.update(window_, state_.camera, data_size_);
-  if (layout.shows_panels) drawPanels(layout);
+  PanelActions actions;
+  if (layout.shows_panels) actions = drawPanels(layout);
+  if (isSeries()) drawTimeBar(cache_, playback_, layout.time, actions);
+  reports_.attempt([&] { apply(actions); });
   if (isShown()) changed_ |= playback_.tick(clockSeconds());
   dragging_ |= handles_.isDragging();
   setBounds();
 }
 
-void CacheView::drawPanels(const WindowLayout& layout) {
+PanelActions CacheView::drawPanels(const WindowLayout& layout) {
   PanelFacts facts;
   facts.shown = {shown_ ? &shown_->statistics : nullptr, isFinal(), isRefining(), frames_->backendName()};
   facts.flies = navigation_.flies();
@@ -258,8 +262,7 @@ void CacheView::drawPanels(const WindowLayout& layout) {
   facts.place = layout.panels;
   const FurtherScalars further = furtherScalars();
   facts.further = &further;
-  const PanelActions actions = panels_.draw(state_, facts);
-  reports_.attempt([&] { apply(actions); });
+  return panels_.draw(state_, facts);
 }
 
 void CacheView::apply(const PanelActions& actions) {

@@ -34,7 +34,7 @@ namespace curvisplat {
 
 /// The places of things in the window.
 struct WindowLayout {
-  Rectangle panels, picture, status;
+  Rectangle panels, picture, time, status;  // `time`: of a series
   bool shows_panels = true;
 };
 
@@ -76,6 +76,8 @@ class CacheView {
   void addTo(MenuFacts& facts);
   bool isEnabled(Command command) const;
   bool isChecked(Command command) const;
+  /// Whether it has time steps, and so a bar for them.
+  bool isSeries() const { return playback_.steps() > 1; }
 
   /// Seconds until the next frame is due without input.
   double wait() const;
@@ -104,7 +106,7 @@ class CacheView {
  private:
   static std::span<const CommandAction<CacheView>> actions();
   void toggle(bool& value);
-  void addPlaneTo(std::vector<ClipPlane>& planes);
+  void addPlaneTo(std::vector<ListedPlane>& planes);
   void saveMovieOf(MovieKind kind);
   void copyLater(bool movie);
   void moveCamera(Command command);
@@ -121,7 +123,6 @@ class CacheView {
   void readSurface(const std::filesystem::path& file);
   void takeSurface();
   void colourFaces(const std::string& scalar);
-  void leaveIsosurfaces(const std::string& before);
   void saveMovieTo(const std::filesystem::path& file);
   MovieRequest newMovie(const std::filesystem::path& file) const;
   void giveUpSaving();
@@ -130,7 +131,7 @@ class CacheView {
   /// The window's picture has this size, in pixels.
   void fitTo(ImageSize size);
   void react(const WindowLayout& layout);
-  void drawPanels(const WindowLayout& layout);
+  PanelActions drawPanels(const WindowLayout& layout);
   void apply(const PanelActions& actions);
   void ask(bool moving);
   void annotate();

@@ -66,10 +66,10 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
        [](View& v) {
          const ViewState& state = v.state_;
          const auto [low, high] = (state.opacity_by ? state.opacity_by->function : state.function).range();
-         v.state_.isovalues.push_back(0.5 * (low + high));
+         v.state_.isosurfaces.push_back({state.opacityScalar(), 0.5 * (low + high)});
          v.changed_ = true;
        },
-       [](const View& v) { return v.state_.isovalues.size() < kMaxIsosurfaces; }},
+       [](const View& v) { return v.state_.isosurfaces.size() < kMaxIsosurfaces; }},
       {Command::kAddSurfaceFile, [](View& v) { v.dialog_.open(FileDialog::Purpose::kOpenSurface); }},
       {Command::kRemoveMarkers,
        [](View& v) {
@@ -85,6 +85,9 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
        kHasSteps, [](const View& v) { return v.playback_.isPlaying(); }},
       {Command::kNextStep, [](View& v) { v.changed_ |= v.playback_.advance(true); }, kHasSteps},
       {Command::kPreviousStep, [](View& v) { v.changed_ |= v.playback_.advance(false); }, kHasSteps},
+      {Command::kFirstStep, [](View& v) { v.changed_ |= v.playback_.goTo(0); }, kHasSteps},
+      {Command::kLastStep, [](View& v) { v.changed_ |= v.playback_.goTo(v.playback_.steps() - 1); },
+       kHasSteps},
   };
   return kActions;
 }
@@ -109,8 +112,8 @@ void CacheView::toggle(bool& value) {
   changed_ = true;
 }
 
-void CacheView::addPlaneTo(std::vector<ClipPlane>& planes) {
-  planes.push_back(planeBeforeViewer(manifest(), state_));
+void CacheView::addPlaneTo(std::vector<ListedPlane>& planes) {
+  planes.push_back({planeBeforeViewer(manifest(), state_)});
   changed_ = true;
 }
 

@@ -376,10 +376,8 @@ void CacheView::chooseScalar(const std::string& name) {
 }
 
 void CacheView::showScalar(const std::string& name) {
-  const std::string before = state_.isoScalar();
   chooseVariable(state_, manifest(), name);
   if (state_.opacity_by && state_.opacity_by->variable == name) state_.opacity_by.reset();
-  leaveIsosurfaces(before);
   ++function_version_;
   changed_ = true;
 }
@@ -391,18 +389,9 @@ void CacheView::chooseOpacityScalar(const std::string& name) {
   if (!is_shown && !name.empty() && name != state_.variable) return chooser_.ask({For::kOpacities, name});
   chooser_.drop(For::kOpacities);  // one that was chosen before
   if (is_shown) return;
-  const std::string before = state_.isoScalar();
   state_.opacity_by.reset();
-  leaveIsosurfaces(before);
   ++function_version_;
   changed_ = true;
-}
-
-/// Values of another scalar mean nothing.
-void CacheView::leaveIsosurfaces(const std::string& before) {
-  if (state_.isovalues.empty() || state_.isoScalar() == before) return;
-  say(fmt::format("The isosurfaces of {} were removed: they were at its values.", before));
-  state_.isovalues.clear();
 }
 
 void CacheView::addFaces(const std::string& name) {
@@ -459,11 +448,7 @@ void CacheView::takeFunction() {
       return;
     }
     case FunctionChooser::For::kOpacities:
-      if (question.scalar != state_.variable) {
-        const std::string before = state_.isoScalar();
-        state_.opacity_by = OpacityScalar{question.scalar, function};
-        leaveIsosurfaces(before);
-      }
+      if (question.scalar != state_.variable) state_.opacity_by = OpacityScalar{question.scalar, function};
       break;
     case FunctionChooser::For::kFaces:
       state_.faces_by = FacesScalar{question.scalar, function};

@@ -27,9 +27,11 @@ void takeScene(const ViewerOptions& options, const CacheReader& cache, ViewState
   state.faces_by.reset();
   if (!options.faces_by.empty())
     state.faces_by = FacesScalar{options.faces_by, automaticFunction(cache, options.faces_by)};
-  state.isovalues = scene.isovalues;
+  state.isosurfaces.clear();
+  for (const double value : scene.isovalues) state.isosurfaces.push_back({state.opacityScalar(), value});
   state.iso_opacity = scene.iso_opacity;
-  state.slices = scene.slices;
+  state.slices.clear();
+  for (const ClipPlane& plane : scene.slices) state.slices.push_back({plane});
   state.slice_opacity = {scene.slice_opacity, scene.slices_by_function};
   state.volume = scene.volume;
 }

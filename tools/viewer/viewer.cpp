@@ -118,7 +118,9 @@ class Viewer {
     const double left = panels_shown_ ? static_cast<double>(Panels::width(window_.textHeight())) : 0;
     layout.shows_panels = panels_shown_;
     layout.panels = {0, line, left, std::max(1.0, height - line)};
-    layout.picture = {left, line, std::max(1.0, width - left), std::max(1.0, height - 2 * line)};
+    const double of_time = opened_.view() && opened_.view()->isSeries() ? line : 0;
+    layout.picture = {left, line, std::max(1.0, width - left), std::max(1.0, height - 2 * line - of_time)};
+    layout.time = {left, height - line - of_time, std::max(1.0, width - left), of_time};
     layout.status = {left, height - line, std::max(1.0, width - left), line};
     return layout;
   }

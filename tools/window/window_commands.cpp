@@ -62,6 +62,8 @@ constexpr std::array kCommands{
     CommandInfo{Command::kPlay, "Time", "Play", GLFW_KEY_SPACE, !kShift, !kControl, "Space"},
     CommandInfo{Command::kNextStep, "Time", "Next step", GLFW_KEY_PERIOD, !kShift, !kControl, "."},
     CommandInfo{Command::kPreviousStep, "Time", "Previous step", GLFW_KEY_COMMA, !kShift, !kControl, ","},
+    CommandInfo{Command::kFirstStep, "Time", "First step", GLFW_KEY_HOME, !kShift, !kControl, "Home"},
+    CommandInfo{Command::kLastStep, "Time", "Last step", GLFW_KEY_END, !kShift, !kControl, "End"},
     CommandInfo{Command::kPanels, "Window", "Panels", GLFW_KEY_H, !kShift, !kControl, "H"},
     CommandInfo{Command::kLightTheme, "Window", "Light theme"},
     CommandInfo{Command::kLargerText, "Window", "Larger text", GLFW_KEY_EQUAL, !kShift, kControl, "Ctrl++",

@@ -54,6 +54,8 @@ enum class Command {
   kPlay,
   kNextStep,
   kPreviousStep,
+  kFirstStep,
+  kLastStep,
   kPanels,
   kLightTheme,
   kLargerText,
