@@ -109,7 +109,9 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
   save();
   // Another scalar's picture has none of this one's isosurfaces, unless the volume is hidden.
   tab("Colour");
+  EXPECT_TRUE(eventually([] { return hasWidget("mark at "); }));  // in the curve
   chooseScalar("volume");
+  EXPECT_TRUE(gone("mark at "));
   tab("Objects");
   placeOf("isosurface 1 is not drawn");
   const Image without = saveAndCopy();

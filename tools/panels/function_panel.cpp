@@ -13,6 +13,7 @@
 
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
+#include "tools/panels/function_painting.h"
 #include "tools/panels/labels.h"
 #include "tools/view/edited_function.h"
 #include "tools/window/widgets.h"
@@ -22,23 +23,9 @@ namespace {
 
 constexpr size_t kBins = 128;
 constexpr float kGrabRadius = 0.6f;  // around a point, in lines of text
-constexpr float kPointRadius = 0.38f;
-constexpr float kCurveLines = 9;  // height in lines of text
+constexpr float kCurveLines = 9;     // height in lines of text
 constexpr OpacityPoint kBand[] = {{0, 0}, {0.4, 0}, {0.5, 0.5}, {0.6, 0}, {1, 0}};
 constexpr OpacityPoint kClear[] = {{0, 0}, {1, 0}};
-
-ImU32 toImGui(const glm::dvec3& rgb) {
-  return ImGui::ColorConvertFloat4ToU32(
-      {static_cast<float>(rgb.x), static_cast<float>(rgb.y), static_cast<float>(rgb.z), 1});
-}
-
-// Most opacities are small, so the curve shows the square root of the opacity.
-float heightOf(double opacity) {
-  return static_cast<float>(std::sqrt(opacity));
-}
-double opacityAt(float height) {
-  return static_cast<double>(height) * static_cast<double>(height);
-}
 
 /// The definitions of the colour maps, each made once.
 const TransferFunctionDefinition& definitionOf(const std::string& map) {
@@ -46,19 +33,6 @@ const TransferFunctionDefinition& definitionOf(const std::string& map) {
   const auto found = made.find(map);
   return found != made.end() ? found->second : made.emplace(map, presetDefinition(map)).first->second;
 }
-
-/// The rectangle of the curve.
-struct Canvas {
-  ImVec2 lower, size;  // upper left corner
-
-  ImVec2 at(double x, float height) const {
-    return {lower.x + static_cast<float>(x) * size.x, lower.y + (1 - height) * size.y};
-  }
-  double xOf(const ImVec2& mouse) const { return std::clamp((mouse.x - lower.x) / size.x, 0.0f, 1.0f); }
-  float heightAt(const ImVec2& mouse) const {
-    return std::clamp(1 - (mouse.y - lower.y) / size.y, 0.0f, 1.0f);
-  }
-};
 
 std::optional<size_t> pointNear(const EditedFunction& function, const Canvas& canvas, const ImVec2& mouse) {
   std::optional<size_t> nearest;
@@ -71,104 +45,6 @@ std::optional<size_t> pointNear(const EditedFunction& function, const Canvas& ca
     nearest = n;
   }
   return nearest;
-}
-
-void paintCurve(const EditedFunction& function, const std::vector<double>& histogram, const Canvas& canvas) {
-  ImDrawList* const list = ImGui::GetWindowDrawList();
-  const ImVec2 end(canvas.lower.x + canvas.size.x, canvas.lower.y + canvas.size.y);
-  list->AddRectFilled(canvas.lower, end, IM_COL32(30, 30, 34, 255));
-  const double most = histogram.empty() ? 0 : *std::max_element(histogram.begin(), histogram.end());
-  for (size_t n = 0; most > 0 && n < histogram.size(); ++n) {
-    // Logarithmic over four decades, so that thin layers stay visible beside the far field.
-    const double part = std::clamp(1 + std::log10(std::max(histogram[n] / most, 1e-9)) / 4, 0.0, 1.0);
-    const double x = static_cast<double>(n) / static_cast<double>(histogram.size());
-    list->AddRectFilled(canvas.at(x, static_cast<float>(part)),
-                        canvas.at(x + 1.0 / static_cast<double>(histogram.size()), 0),
-                        IM_COL32(96, 104, 120, 255));
-  }
-  const float unit = ImGui::GetFontSize();
-  const OpacityCurve curve(function.points());
-  ImVec2 before = canvas.at(0, heightOf(curve.at(0)));
-  for (float x = 1; x <= canvas.size.x; ++x) {
-    const double part = x / canvas.size.x;
-    const ImVec2 now = canvas.at(part, heightOf(curve.at(part)));
-    list->AddLine(before, now, IM_COL32(250, 250, 250, 255), 0.11f * unit);
-    before = now;
-  }
-  for (const OpacityPoint& point : function.points()) {
-    const ImVec2 at = canvas.at(point.x, heightOf(point.opacity));
-    list->AddCircleFilled(at, kPointRadius * unit, toImGui(function.colourAt(point.x)));
-    list->AddCircle(at, kPointRadius * unit, IM_COL32(255, 255, 255, 255), 0, 0.08f * unit);
-  }
-}
-
-/// A strip of colours: `at` gives that of each part, 0..1.
-template <typename At>
-void paintStrip(const ImVec2& lower, const ImVec2& size, const At& at) {
-  ImDrawList* const list = ImGui::GetWindowDrawList();
-  for (float x = 0; x < size.x; x += 2)
-    list->AddRectFilled({lower.x + x, lower.y},
-                        {std::min(lower.x + x + 2, lower.x + size.x), lower.y + size.y},
-                        toImGui(at(static_cast<double>(x / size.x))));
-}
-
-/// The width of curve, colours and numbers: half a point of the curve's end lies beside it.
-float availableWidth() {
-  return ImGui::GetContentRegionAvail().x - kPointRadius * ImGui::GetFontSize();
-}
-
-void paintColours(const EditedFunction& function) {
-  const ImVec2 size(availableWidth(), ImGui::GetTextLineHeight());
-  paintStrip(ImGui::GetCursorScreenPos(), size, [&](double x) { return function.colourAt(x); });
-  ImGui::Dummy(size);
-}
-
-/// Five scalars under the curve or the colours, each below its place.
-void paintNumbers(const EditedFunction& function) {
-  const ImVec2 lower = ImGui::GetCursorScreenPos();
-  const float width = availableWidth();
-  constexpr int kNumbers = 4;
-  const auto scalar = [&](int n) { return function.scalarAt(static_cast<double>(n) / kNumbers); };
-  // As many digits as tell neighbours apart: 0.999, 1.001 and not 0.999, 1.
-  double closest = std::abs(scalar(1) - scalar(0)), largest = 0;
-  for (int n = 0; n <= kNumbers; ++n) {
-    largest = std::max(largest, std::abs(scalar(n)));
-    if (n > 0) closest = std::min(closest, std::abs(scalar(n) - scalar(n - 1)));
-  }
-  const double ratio = closest > 0 ? std::min(largest / closest, 1e6) : 1;
-  const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(ratio))) + 1, 3, 5);
-  for (int n = 0; n <= kNumbers; ++n) {
-    const float part = static_cast<float>(n) / kNumbers;
-    const std::string text = fmt::format("{:.{}g}", scalar(n), digits);
-    const float own = ImGui::CalcTextSize(text.c_str()).x;
-    ImGui::GetWindowDrawList()->AddText({lower.x + part * (width - own), lower.y},
-                                        ImGui::GetColorU32(ImGuiCol_Text), text.c_str());
-  }
-  ImGui::Dummy({width, ImGui::GetTextLineHeight()});
-}
-
-constexpr double kHeights[] = {0.05, 0.25, 0.5, 1};  // opacities at the left of the curve
-
-/// The width of the numbers beside the curve and of half a point at its end.
-float widthOfHeights() {
-  float width = 0;
-  for (const double opacity : kHeights)
-    width = std::max(width, ImGui::CalcTextSize(fmt::format("{:g}", opacity).c_str()).x);
-  return width + 2 * kPointRadius * ImGui::GetFontSize();
-}
-
-/// Each beside its height, where no point of the curve lies over it.
-void paintHeights(const Canvas& canvas) {
-  const float down = 0.5f * ImGui::GetFontSize(), away = 1.5f * kPointRadius * ImGui::GetFontSize();
-  for (const double opacity : kHeights) {
-    const ImVec2 at = canvas.at(0, heightOf(opacity));
-    ImDrawList* const list = ImGui::GetWindowDrawList();
-    list->AddLine(at, {at.x + canvas.size.x, at.y}, IM_COL32(255, 255, 255, 28));
-    const std::string text = fmt::format("{:g}", opacity);
-    const float y = std::clamp(at.y - down, canvas.lower.y, canvas.lower.y + canvas.size.y - 2 * down);
-    list->AddText({at.x - away - ImGui::CalcTextSize(text.c_str()).x, y},
-                  ImGui::GetColorU32(ImGuiCol_Text, 0.7f), text.c_str());
-  }
 }
 
 }  // namespace
@@ -193,13 +69,13 @@ std::string FunctionPanel::updateHistogram(const EditedFunction& function, size_
 }
 
 FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t variable, Shows shows,
-                                          uint64_t step) {
+                                          uint64_t step, std::span<const double> marked) {
   Result result;
   ImGui::PushID(this);
   result.error = updateHistogram(function, variable);
   const float left = shows == Shows::kColours ? 0 : widthOfHeights();
   if (left > 0) ImGui::Indent(left);
-  if (shows != Shows::kColours) result.changed |= drawCurve(function);
+  if (shows != Shows::kColours) result.changed |= drawCurve(function, marked);
   if (shows != Shows::kOpacities) paintColours(function);
   paintNumbers(function);
   if (left > 0) ImGui::Unindent(left);
@@ -230,14 +106,14 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
     ImGui::SameLine();
     result.save = ImGui::Button("save to file...");
     nameWidget("save");
-    hint("as a ParaView preset, which render --tf draws with");
+    hint("as a ParaView preset, .json");
   }
   result.dragging = dragged_.has_value();
   ImGui::PopID();
   return result;
 }
 
-bool FunctionPanel::drawCurve(EditedFunction& function) {
+bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> marked) {
   const Canvas canvas{ImGui::GetCursorScreenPos(),
                       {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
   ImGui::InvisibleButton("curve", canvas.size,
@@ -262,7 +138,7 @@ bool FunctionPanel::drawCurve(EditedFunction& function) {
     function.movePoint(*dragged_, canvas.xOf(mouse), opacityAt(canvas.heightAt(mouse)));
     changed = true;
   }
-  paintCurve(function, histogram_, canvas);
+  paintCurve(function, histogram_, marked, canvas);
   paintHeights(canvas);
   if (const auto shown = dragged_ ? dragged_ : near) {
     const OpacityPoint& point = function.points()[*shown];

@@ -4,6 +4,7 @@
 
 #include <future>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,11 +30,12 @@ class FunctionPanel {
     std::string error;                // of reading the histogram, or why what the user asked for cannot be
   };
   /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables. `step`: the
-  /// one that is shown.
-  Result draw(EditedFunction& function, size_t variable, Shows shows, uint64_t step);
+  /// one that is shown. `marked`: scalars that the curve marks by lines.
+  Result draw(EditedFunction& function, size_t variable, Shows shows, uint64_t step,
+              std::span<const double> marked = {});
 
  private:
-  bool drawCurve(EditedFunction& function);
+  bool drawCurve(EditedFunction& function, std::span<const double> marked);
   bool drawPoints(EditedFunction& function);
   bool drawMaps(EditedFunction& function, Result& result);
   bool drawColours(EditedFunction& function);

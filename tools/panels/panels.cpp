@@ -204,7 +204,11 @@ void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t ste
   using Shows = FunctionPanel::Shows;
   const auto draw = [&](FunctionPanel& panel, EditedFunction& function, const std::string& variable,
                         Shows shows) {
-    const FunctionPanel::Result result = panel.draw(function, cache_.variableNamed(variable), shows, step);
+    std::vector<double> isovalues;
+    for (const Isosurface& one : state.isosurfaces)
+      if (one.visible && one.scalar == variable) isovalues.push_back(one.value);
+    const FunctionPanel::Result result =
+        panel.draw(function, cache_.variableNamed(variable), shows, step, isovalues);
     actions.function_changed |= result.changed;
     actions.dragging |= result.dragging;
     actions.automatic_function |= result.automatic;
