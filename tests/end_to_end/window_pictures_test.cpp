@@ -62,6 +62,18 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   expectDraws(command, twice);
 }
 
+/// The window's memory is too little for them: they take more, where it is free.
+TEST_F(WindowPictures, LargeOnesTakeTheMemoryThatTheyNeed) {
+  open({"--memory", "160M", "--iso", "0.5"});
+  save();
+  const Words large{"render", "a.splats", "--size", "1920x1080", "--iso", "0.5", "-o", "refused.png"};
+  ASSERT_NE(runProgram(large + Words{"--memory", "160M"}).status, 0);
+  openDialog("large.png");
+  clickUntil("picture size 1920 x 1080", [] { return hasWidget("picture of 1920 x 1080"); });
+  EXPECT_EQ(accept("large.png").size.height, 1080);
+  close();
+}
+
 /// One frame takes so long that all input comes before the next one: Control and A, letters, Return.
 TEST_F(WindowPictures, HaveTheNameThatWasTypedDuringOneFrame) {
   open();

@@ -167,6 +167,7 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   ImGui::SetNextWindowPos(toImGui(place.x, place.y));
   ImGui::SetNextWindowSize(toImGui(place.width, place.height));
   ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding,
                       ImVec2(ImGui::GetStyle().FramePadding.x * 2, ImGui::GetStyle().FramePadding.y));
   ImGui::Begin("status", nullptr,
@@ -190,7 +191,7 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   ImGui::TextDisabled("%s", state.c_str());
   nameWidget("state " + state);
   ImGui::End();
-  ImGui::PopStyleVar(2);
+  ImGui::PopStyleVar(3);
 }
 
 void CacheView::saveTo(const fs::path& file) {
@@ -288,8 +289,7 @@ void CacheView::use(const FileDialog::Chosen& chosen) {
         return;
       case FileDialog::Purpose::kSaveFunction:
         writeFileDurably(file, toParaViewPreset(state_.function.definition()));
-        return say(
-            fmt::format("saved {}; draw with it: render --tf {}", file.string(), shortPath(file).string()));
+        return say(fmt::format("saved colours and opacities to {}", file.string()));
       case FileDialog::Purpose::kSavePicture:
         if (chosen.size &&
             !(chosen.size->width == picture_size_.width && chosen.size->height == picture_size_.height))

@@ -8,6 +8,10 @@
 #include "render/camera/camera_path.h"
 #include "render/frame/frame.h"
 #include "render/image/image_file.h"
+#include "render/image/too_little_memory.h"
+#include "stream/base/error.h"
+#include "stream/base/os.h"
+#include "stream/base/text.h"
 #include "tools/view/picture_layout.h"
 
 namespace curvisplat {
@@ -30,6 +34,25 @@ class OnePicture final : public MovieOutput {
  private:
   const std::filesystem::path file_;
 };
+
+/// Draws a frame, with more memory where it needs more, up to what programs can have now. `options` keep that memory for
+/// the next frame.
+Image drawWithEnough(FrameRenderer& renderer, const Camera& camera, FrameOptions& options,
+                     FrameStatistics& statistics, Progress& progress) {
+  for (;;) {
+    try {
+      statistics = {};
+      return renderer.render(camera, options, statistics, &progress);
+    } catch (const TooLittleMemory& error) {
+      const uint64_t wanted = std::max(error.least_bytes, options.memory_bytes + options.memory_bytes / 2);
+      const uint64_t available = os::availableMemory();
+      if (available > 0 && wanted > available)
+        throw Error("a picture of {} x {} pixels needs {} of memory, and {} are free: choose a smaller size",
+                    options.size.width, options.size.height, byteText(wanted), byteText(available));
+      options.memory_bytes = wanted;
+    }
+  }
+}
 
 }  // namespace
 
@@ -96,7 +119,7 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
     ShownFrame drawn;
     drawn.view = player.renderer().screenView(camera, options);
     drawn.data = {movie.cache.manifest().lower, movie.cache.manifest().upper};
-    drawn.image = player.renderer().render(camera, options, drawn.statistics, &of_frame);
+    drawn.image = drawWithEnough(player.renderer(), camera, options, drawn.statistics, of_frame);
     const AnnotatedScene shown = sceneOf(state, functions, drawn, size);
     output->write(frame, annotated(std::move(drawn.image), state.annotations, shown));
     progress.advance(1);

@@ -54,7 +54,8 @@ std::string textOf(const MovieRequest& movie);
 /// pictures: "a.png" -> "a_%04d.png".
 std::filesystem::path movieNameOf(const std::filesystem::path& file);
 
-/// Draws and writes all of it; returns the name of what was written. Its reader goes to other steps. Any thread. Throws Error as
+/// Draws and writes all of it; returns the name of what was written. A frame that needs more memory than the state gives
+/// takes it, where it is free. Its reader goes to other steps. Any thread. Throws Error as
 /// drawing and writing do, and Interrupted once `progress` is stopped.
 std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open, Progress& progress);
 

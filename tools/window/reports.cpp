@@ -4,14 +4,26 @@
 #include <cstddef>
 #include <new>
 
+#include <fmt/format.h>
+
+#include "render/image/too_little_memory.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr double kShortestSeconds = 4, kPerLetterSeconds = 0.06, kErrorSeconds = 60;
 constexpr size_t kMaxShown = 3, kMaxLog = 100;
+
+/// In the window's words: its own text names options.
+std::string textOf(const TooLittleMemory& error) {
+  constexpr const char* kWhere = "raise \"memory\" under View, Detail and memory";
+  if (error.least_bytes > 0)
+    return fmt::format("this picture needs {} of memory: {}", byteText(error.least_bytes), kWhere);
+  return fmt::format("this picture needs more memory: {}, or \"error, pixels\"", kWhere);
+}
 
 }  // namespace
 
@@ -56,8 +68,10 @@ bool Reports::attempt(const std::function<void()>& act) {
 
 void Reports::report(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error))
-    return report(
-        std::string("out of memory; lower \"memory\" under Detail and memory, or close other programs"));
+    return report(std::string(
+        "out of memory; lower \"memory\" under View, Detail and memory, or close other programs"));
+  if (const auto* const too_little = dynamic_cast<const TooLittleMemory*>(&error))
+    return report(textOf(*too_little));
   report(oneLine(error.what()));
 }
 
