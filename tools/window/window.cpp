@@ -140,6 +140,8 @@ void Window::applyLook() {
   style.WindowRounding = style.FrameRounding = style.PopupRounding = style.GrabRounding = 3;
   style.WindowBorderSize = 0;
   if (light_) style.FrameBorderSize = 1;
+  // Dear ImGui's own grey has a contrast of 2.5 : 1 on light panels.
+  style.Colors[ImGuiCol_TextDisabled] = light_ ? ImVec4(0.4f, 0.4f, 0.4f, 1) : ImVec4(0.6f, 0.6f, 0.6f, 1);
   style.Colors[ImGuiCol_PopupBg].w = style.Colors[ImGuiCol_WindowBg].w = 1;
   style.ScaleAllSizes(static_cast<float>(units));
   ImGui::GetStyle() = style;
