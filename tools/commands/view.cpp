@@ -13,11 +13,13 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/options/convert_arguments.h"
+#include "tools/options/example_grid.h"
 #include "tools/options/frame_sequence.h"
 #include "tools/options/further_scalars.h"
 #include "tools/options/grid_surfaces.h"
@@ -103,6 +105,7 @@ ConversionServices conversionServices(ValuePrecision precision) {
   ConversionServices services;
   services.to_cache = [precision](const Paths& files, Progress& progress, const OpeningEvents& events) {
     if (!isGrid(files)) return files.front();
+    if (files == exampleFiles()) writeExample(progress);
     KeptCacheEvents kept;
     kept.say = events.say;
     kept.preview = [&](const KeptPreview& preview) {
@@ -118,6 +121,8 @@ ConversionServices conversionServices(ValuePrecision precision) {
     return scalars;
   };
   services.add_scalar = addFurtherScalar;
+  services.is_grid_folder = isGridFolder;
+  services.example = exampleFiles;
   return services;
 }
 

@@ -58,6 +58,10 @@ struct ConversionServices {
   std::function<void(const std::filesystem::path& cache, const Paths& files, const std::string& scalar,
                      Progress& progress)>
       add_scalar;
+  /// Whether a folder is the grid of one format, such as a Zarr store or an OpenFOAM case. Fast.
+  std::function<bool(const std::filesystem::path& folder)> is_grid_folder;
+  /// The files of an example, which to_cache() writes where they are missing.
+  std::function<Paths()> example;
 };
 
 /// A job on threads of low priority: its progress, and the file that it makes.

@@ -17,6 +17,7 @@
 #include "tools/viewer/cache_view.h"
 #include "tools/viewer/movie.h"
 #include "tools/viewer/opened_view.h"
+#include "tools/viewer/welcome_page.h"
 #include "tools/window/reports.h"
 #include "tools/window/widgets.h"
 #include "tools/window/window.h"
@@ -173,27 +174,22 @@ class Viewer {
   }
 
   void drawWelcome(const WindowLayout& place) {
-    ImGui::SetNextWindowPos({static_cast<float>(place.picture.x), static_cast<float>(place.picture.y)});
-    ImGui::SetNextWindowSize({static_cast<float>(place.picture.width),
+    // In place of the panels, too.
+    ImGui::SetNextWindowPos({0, static_cast<float>(place.picture.y)});
+    ImGui::SetNextWindowSize({static_cast<float>(place.picture.x + place.picture.width),
                               static_cast<float>(place.picture.height + place.status.height)});
     ImGui::Begin("welcome", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
     window_.coverCurrent();                        // what is clicked here is not for a picture to come
     if (opened_.isOpening()) return ImGui::End();  // its progress is shown in this place
-    ImGui::TextUnformatted("Drop a cache or a grid with its solution here, or");
-    if (ImGui::Button("open...")) run(Command::kOpen);
-    nameWidget("open");
-    ImGui::TextDisabled(
-        "%s", "caches: NAME.splats; grids: PLOT3D, CGNS, VTK, NetCDF, OpenFOAM, Tecplot, EnSight, XDMF, ...");
-    if (!settings_.recent.empty()) ImGui::TextUnformatted("\nopened before:");
-    for (size_t n = 0; n < settings_.recent.size(); ++n) {
-      std::string label;
-      for (const std::string& file : settings_.recent[n]) label += file + " ";
-      if (ImGui::Selectable(fmt::format("{}##{}", label, n).c_str())) to_open_ = settings_.recent[n];
-      nameWidget(fmt::format("recent {}", n + 1));
-    }
+    const WelcomeChoice choice = drawWelcomePage(settings_.recent, options_.conversion.example != nullptr);
     ImGui::End();
+    if (choice.opens) run(Command::kOpen);
+    if (choice.recent) to_open_ = settings_.recent[*choice.recent];
+    if (!choice.example) return;
+    to_open_.emplace();
+    for (const fs::path& file : options_.conversion.example()) to_open_->push_back(file.string());
   }
 
   void pressKeys() {
@@ -274,7 +270,7 @@ class Viewer {
   Window window_;
   Toasts toasts_;
   Reports reports_{toasts_, glfwGetTime};
-  FileDialog dialog_;
+  FileDialog dialog_{options_.conversion.is_grid_folder};
   OpenedView opened_{options_, {window_, reports_, dialog_, settings_, [this] { return pictureSize(); }}};
   std::unique_ptr<BackgroundJob> movie_;  // that is being drawn
   bool saves_picture_ = false;            // it is one picture

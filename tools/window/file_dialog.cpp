@@ -45,8 +45,9 @@ Look lookOf(FileDialog::Purpose purpose) {
   return {"", ""};
 }
 
-bool isCache(const fs::path& path) {
-  return path.extension() == ".splats";
+/// Whether a folder is opened as a whole.
+bool isOneFile(const fs::path& folder, const IsGridFolder& is_grid_folder) {
+  return folder.extension() == ".splats" || (is_grid_folder && is_grid_folder(folder));
 }
 
 std::string sizeText(uint64_t bytes) {
@@ -58,18 +59,20 @@ std::string sizeText(uint64_t bytes) {
 
 }  // namespace
 
-std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std::string>& endings) {
+std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std::string>& endings,
+                                   const IsGridFolder& is_grid_folder) {
   std::vector<FolderEntry> entries;
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     const std::string name = at->path().filename().string();
     if (name.starts_with('.')) continue;
     std::error_code ignored;
-    const bool is_folder = at->is_directory(ignored) && !isCache(name);
+    const bool is_directory = at->is_directory(ignored);
+    const bool is_folder = is_directory && !isOneFile(at->path(), is_grid_folder);
     const bool fits = endings.empty() || std::find(endings.begin(), endings.end(),
                                                    at->path().extension().string()) != endings.end();
     if (!is_folder && !fits) continue;
-    const uint64_t bytes = is_folder || isCache(name) ? 0 : at->file_size(ignored);
+    const uint64_t bytes = is_directory ? 0 : at->file_size(ignored);
     entries.push_back({name, is_folder, ignored ? 0 : bytes});
   }
   if (error) throw Error("{}: cannot be read: {}", folder.string(), error.message());
@@ -104,7 +107,7 @@ void FileDialog::enter(const fs::path& folder) {
   overwrites_.clear();
   if (!lookOf(*purpose_).saves) select({});
   try {
-    entries_ = entriesOf(folder, lookOf(*purpose_).endings);
+    entries_ = entriesOf(folder, lookOf(*purpose_).endings, is_grid_folder_);
     folder_ = folder;
   } catch (const Error& error) {
     error_ = error.what();
@@ -260,7 +263,8 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
     error_ = look.saves ? "type a name first" : "choose a file first, or type its name";
     return std::nullopt;
   }
-  if (const fs::path path = whole(name_); fs::is_directory(path, ignored) && !isCache(path)) {
+  if (const fs::path path = whole(name_);
+      fs::is_directory(path, ignored) && !isOneFile(path, is_grid_folder_)) {
     enter(path);
     name_.clear();
     return std::nullopt;

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render/image/image.h"
@@ -16,14 +18,18 @@ namespace curvisplat {
 /// An entry of a folder.
 struct FolderEntry {
   std::string name;
-  bool is_folder = false;  // to go into; a cache is none
+  bool is_folder = false;  // to go into; a cache and a grid's folder are none
   uint64_t bytes = 0;
 };
+
+/// Whether a folder is a grid's, to be opened as a file is.
+using IsGridFolder = std::function<bool(const std::filesystem::path& folder)>;
 
 /// Folders first, by name, without those that begin with a dot; files with one of the endings, or all if
 /// there are none. Throws Error if the folder cannot be read.
 std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
-                                   const std::vector<std::string>& endings);
+                                   const std::vector<std::string>& endings,
+                                   const IsGridFolder& is_grid_folder);
 
 class FileDialog {
  public:
@@ -33,6 +39,9 @@ class FileDialog {
     std::vector<std::filesystem::path> files;
     std::optional<ImageSize> size = std::nullopt;  // of a picture
   };
+
+  /// `is_grid_folder` may be empty: no folder is.
+  explicit FileDialog(IsGridFolder is_grid_folder) : is_grid_folder_(std::move(is_grid_folder)) {}
 
   /// Opens it with the next draw(), in the folder it was in last. `name`: the one that is offered.
   void open(Purpose purpose, const std::string& name = "");
@@ -52,6 +61,7 @@ class FileDialog {
   std::optional<Chosen> accept();
   void drawSize();
 
+  const IsGridFolder is_grid_folder_;
   std::optional<Purpose> purpose_;
   bool opens_ = false;
   int frames_to_focus_ = 0;  // at most: what is typed waits until the name has the focus

@@ -1,0 +1,83 @@
+// The window without a file: its start page, an example, and grids that are folders in its dialog.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "tests/end_to_end/window_fixture.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class WindowStart : public KeptCaches {
+ protected:
+  void SetUp() override {
+    WindowTest::SetUp();
+    if (IsSkipped()) return;
+    KeptCaches::SetUp();
+    fs::remove_all("kept");
+  }
+  void openEmpty() {
+    fs::remove("widgets");
+    window_ = std::make_unique<RunningProgram>(
+        Words{"view", "--size", fmt::format("{}x{}", kWindow.width, kWindow.height)});
+    rest_ = {kWindow.width / 2, kWindow.height / 2};
+    moveTo(rest_);
+  }
+};
+
+/// A grid of 6 x 6 x 6 nodes in a store of Zarr 2.
+void writeZarr(const fs::path& store) {
+  const auto array = [&](const std::string& name, const std::string& shape, const std::string& dimensions,
+                         const std::string& chunk, const std::vector<float>& values) {
+    fs::create_directories(store / name);
+    std::ofstream(store / name / ".zarray")
+        << R"({"zarr_format": 2, "dtype": "<f4", "compressor": null, "fill_value": 0, "order": "C", )"
+        << fmt::format(R"("filters": null, "shape": {0}, "chunks": {0}}})", shape);
+    std::ofstream(store / name / ".zattrs") << fmt::format(R"({{"_ARRAY_DIMENSIONS": {}}})", dimensions);
+    std::ofstream(store / name / chunk, std::ios::binary)
+        .write(reinterpret_cast<const char*>(values.data()),
+               static_cast<std::streamsize>(values.size() * sizeof(float)));
+  };
+  for (const char* axis : {"x", "y", "z"})
+    array(axis, "[6]", fmt::format(R"(["{}"])", axis), "0", {0, 1, 2, 3, 4, 5});
+  std::vector<float> values(6 * 6 * 6);
+  std::iota(values.begin(), values.end(), 0.0f);
+  array("f", "[6, 6, 6]", R"(["z", "y", "x"])", "0.0.0", values);
+  std::ofstream(store / ".zgroup") << R"({"zarr_format": 2})";
+}
+
+/// Its folder is a grid, and is not entered.
+TEST_F(WindowStart, TheDialogOpensAZarrStore) {
+  writeZarr("box.zarr");
+  openEmpty();
+  click("open");
+  const Place place = placeOf("file box.zarr");
+  moveTo(place);
+  act({"click", "--repeat", "2", "1"});
+  placeOf("scalar shown: f");
+  close();
+}
+
+TEST_F(WindowStart, AnExampleIsShownWithoutAFile) {
+  openEmpty();
+  click("example");
+  placeOf("step 1 of 8");
+  ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
+  placeOf("curve");
+  close();
+  // Among what was opened before, also where its files have been removed.
+  fs::remove_all("kept");
+  openEmpty();
+  click("recent 1");
+  placeOf("step 1 of 8");
+  close();
+}
+
+}  // namespace
+}  // namespace curvisplat
