@@ -318,6 +318,29 @@ def reversed_floats(data):
     return b"".join(data[n:n + 4] for n in range(len(data) - 4, -4, -4))
 
 
+def phone(browser, server):
+    """On a phone nothing is wider than the page, and a finger finds what it is to press."""
+    tab = opened(browser, server.url, (390, 844))
+    tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    tab.run("document.getElementById('add-slice').click()")
+    rest(tab)
+    wrong = tab.run("""[...document.querySelectorAll('button, select, input, summary')]
+      .map(e => e.closest('.check') || e).filter(e => e.offsetParent)
+      .map(e => [e.id || e.textContent.trim() || e.outerHTML.slice(0, 60), e.getBoundingClientRect()])
+      .filter(([name, r]) => r.left < 0 || r.right > 390 || r.height < 44 || r.width < 44)
+      .map(([name, r]) => `${name}: ${r.width} x ${r.height} at ${r.left}`)""")
+    expect(not wrong, f"targets of 44 pixels within the page: {wrong}")
+    expect(tab.run("document.getElementById('panel').scrollWidth <= document.getElementById('panel').clientWidth"), "nothing is cropped")
+    shot(tab, "phone")
+    tab.run("document.getElementById('panel').scrollTop = 330")
+    shot(tab, "phone_scrolled")
+    # Its whole label switches a box.
+    before = tab.run("document.getElementById('outline').checked")
+    tab.run("document.getElementById('outline').closest('label').click()")
+    expect(tab.run("document.getElementById('outline').checked") != before, "a label switches its box")
+    tab.call("Page.navigate", url="about:blank")
+
+
 def wrong_token(browser, server):
     tab = browser.tab(server.url[:-1] + ("0" if server.url[-1] != "0" else "1"))
     tab.wait("document.body && document.body.textContent.includes('token is wrong')", "the refusal")
@@ -417,6 +440,8 @@ with tempfile.TemporaryDirectory() as folder:
             print("sizes done")
             time_steps(browser, server)
             print("time steps done")
+            phone(browser, server)
+            print("phone done")
             wrong_token(browser, server)
             expect(server.stop() == 130, "Ctrl-C ends the server with pages open")
         with serving(program, [f"{folder}/two.splats"]) as server:
