@@ -295,6 +295,7 @@ TEST_F(WindowSession, LeavesAScreenshotOfEveryStep) {
   addPoint();
   shows("4_opacity_edited", 35);
   chooseScalar("volume");
+  moveTo(rest_);  // no tooltip of the panels lies over the picture
   shows("5_another_scalar", 35);
   tab("View");
   click("dark");

@@ -52,7 +52,7 @@ void writeZarr(const fs::path& store) {
   std::ofstream(store / ".zgroup") << R"({"zarr_format": 2})";
 }
 
-/// Its folder is a grid, and is not entered.
+/// The folder is a grid, and is not entered.
 TEST_F(WindowStart, TheDialogOpensAZarrStore) {
   writeZarr("box.zarr");
   openEmpty();

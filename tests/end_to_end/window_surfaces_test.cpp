@@ -197,7 +197,7 @@ TEST_F(WindowSurfaces, WhatTheMenuAddsIsScrolledTo) {
   close();
 }
 
-/// What is hidden stays in the list, and is not in the command.
+/// An object that is hidden stays in the list, and is not in the command.
 TEST_F(WindowSurfaces, EyesHideWhatIsListed) {
   openObjects({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);
   placeOf("Isosurfaces (1)");

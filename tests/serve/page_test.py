@@ -320,7 +320,12 @@ def reversed_floats(data):
 
 def phone(browser, server):
     """On a phone nothing is wider than the page, and a finger finds what it is to press."""
+    wide = opened(browser, server.url)
+    usual = wide.run(f"distance({PAGE}.state.camera)")
+    wide.call("Page.navigate", url="about:blank")
     tab = opened(browser, server.url, (390, 844))
+    expect(tab.run(f"distance({PAGE}.state.camera)") > 1.5 * usual, "the first view has the data's width in a narrow picture")
+    shot(tab, "phone_first")
     tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     tab.run("document.getElementById('add-slice').click()")
     rest(tab)

@@ -214,7 +214,7 @@ TEST(RenderCommand, LeavesDefaultsOut) {
             "--parallel-scale 0.7");
 }
 
-/// Those of the scalar that the picture has; without the volume, of any.
+/// The isosurfaces are those of the scalar that the picture has; without the volume, of any.
 TEST(ViewState, DrawsIsosurfacesOfOneScalar) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   chooseVariable(state, manifest(), "u v");

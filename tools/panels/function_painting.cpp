@@ -30,7 +30,7 @@ double opacityAt(float height) {
 }
 
 void paintCurve(const EditedFunction& function, const std::vector<double>& histogram,
-                std::span<const double> marked, const Canvas& canvas) {
+                std::span<const double> marked, const CurveCanvas& canvas) {
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const ImVec2 end(canvas.lower.x + canvas.size.x, canvas.lower.y + canvas.size.y);
   list->AddRectFilled(canvas.lower, end, IM_COL32(30, 30, 34, 255));
@@ -116,7 +116,7 @@ float widthOfHeights() {
   return width + 2 * kPointRadius * ImGui::GetFontSize();
 }
 
-void paintHeights(const Canvas& canvas) {
+void paintHeights(const CurveCanvas& canvas) {
   const float down = 0.5f * ImGui::GetFontSize(), away = 1.5f * kPointRadius * ImGui::GetFontSize();
   for (const double opacity : kHeights) {
     const ImVec2 at = canvas.at(0, heightOf(opacity));

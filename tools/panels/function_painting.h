@@ -1,4 +1,4 @@
-// What the editor of a transfer function paints: its curve over the histogram, strips of colours, numbers on both
+// Paints the editor of a transfer function: its curve over the histogram, strips of colours, numbers on both
 // axes. For the window's thread, within a frame of Dear ImGui.
 #pragma once
 
@@ -19,7 +19,7 @@ float heightOf(double opacity);
 double opacityAt(float height);
 
 /// The rectangle of the curve.
-struct Canvas {
+struct CurveCanvas {
   ImVec2 lower, size;  // upper left corner
 
   ImVec2 at(double x, float height) const {
@@ -33,7 +33,7 @@ struct Canvas {
 
 /// Paints histogram, curve and points. `marked`: scalars at which a line stands, those of isosurfaces.
 void paintCurve(const EditedFunction& function, const std::vector<double>& histogram,
-                std::span<const double> marked, const Canvas& canvas);
+                std::span<const double> marked, const CurveCanvas& canvas);
 /// A strip of colours: `at` gives that of each part, 0..1.
 void paintStrip(const ImVec2& lower, const ImVec2& size, const std::function<glm::dvec3(double)>& at);
 /// The width of curve, colours and numbers: half a point of the curve's end lies beside it.
@@ -45,6 +45,6 @@ void paintNumbers(const EditedFunction& function);
 /// The width of the opacities beside the curve and of half a point at its end.
 float widthOfHeights();
 /// Opacities, each beside its height, where no point of the curve lies over it.
-void paintHeights(const Canvas& canvas);
+void paintHeights(const CurveCanvas& canvas);
 
 }  // namespace curvisplat

@@ -34,7 +34,8 @@ const TransferFunctionDefinition& definitionOf(const std::string& map) {
   return found != made.end() ? found->second : made.emplace(map, presetDefinition(map)).first->second;
 }
 
-std::optional<size_t> pointNear(const EditedFunction& function, const Canvas& canvas, const ImVec2& mouse) {
+std::optional<size_t> pointNear(const EditedFunction& function, const CurveCanvas& canvas,
+                                const ImVec2& mouse) {
   std::optional<size_t> nearest;
   float least = kGrabRadius * ImGui::GetFontSize();
   for (size_t n = 0; n < function.points().size(); ++n) {
@@ -114,8 +115,8 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
 }
 
 bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> marked) {
-  const Canvas canvas{ImGui::GetCursorScreenPos(),
-                      {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
+  const CurveCanvas canvas{ImGui::GetCursorScreenPos(),
+                           {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
   ImGui::InvisibleButton("curve", canvas.size,
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
   nameWidget("curve");

@@ -17,36 +17,31 @@ namespace curvisplat {
 
 namespace {
 
-void pushTabPadding() {
+constexpr const char* kTabs[] = {"Colour", "Objects", "View", "Time"};
+
+/// Draws the first `number` tabs, and returns the one that is shown; `select`: one to show from now on, or -1. Each is named
+/// "tab NAME". Dear ImGui's own tabs miss a click that comes in the first frame in which the mouse is over them.
+int drawTabs(int number, int select) {
   const float unit = ImGui::GetFontSize();
+  int* const stored = ImGui::GetStateStorage()->GetIntRef(ImGui::GetID("tab"), 0);
+  if (select >= 0) *stored = select;
+  const int shown = *stored < number ? *stored : 0;
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {0.9f * unit, 0.4f * unit});
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0.3f * unit, 0});
+  ImGui::PushStyleColor(ImGuiCol_ButtonHovered, ImGui::GetStyleColorVec4(ImGuiCol_TabHovered));
+  for (int n = 0; n < number; ++n) {
+    if (n > 0) ImGui::SameLine();
+    ImGui::PushStyleColor(ImGuiCol_Button,
+                          ImGui::GetStyleColorVec4(n == shown ? ImGuiCol_TabActive : ImGuiCol_Tab));
+    if (ImGui::Button(kTabs[n])) *stored = n;
+    ImGui::PopStyleColor();
+    nameWidget(std::string("tab ") + kTabs[n]);
+  }
+  ImGui::PopStyleColor();
+  ImGui::Separator();
+  ImGui::PopStyleVar(2);
+  return shown;
 }
-
-/// A tab while it is in scope; false while another one is shown. Named "tab NAME". What it has scrolls by itself, above
-/// the footer.
-class Tab {
- public:
-  Tab(const char* name, float footer, bool select = false) {
-    pushTabPadding();
-    open_ = ImGui::BeginTabItem(name, nullptr, select ? ImGuiTabItemFlags_SetSelected : 0);
-    ImGui::PopStyleVar();
-    nameWidget(std::string("tab ") + name);
-    if (!open_) return;
-    // The scroll bar is always there, so that widgets keep their width.
-    ImGui::BeginChild("scrolled", {0, -footer}, false, ImGuiWindowFlags_AlwaysVerticalScrollbar);
-  }
-  ~Tab() {
-    if (!open_) return;
-    ImGui::EndChild();
-    ImGui::EndTabItem();
-  }
-  Tab(const Tab&) = delete;
-  Tab& operator=(const Tab&) = delete;
-  explicit operator bool() const { return open_; }
-
- private:
-  bool open_ = false;
-};
 
 void drawFooter(PanelActions& actions) {
   ImGui::Separator();
@@ -72,17 +67,15 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   const float footer = ImGui::GetFrameHeight() + 2 * style.ItemSpacing.y + 1;
   // Before the lists are drawn, which notice what is new when they are shown.
   const bool has_more = hasMoreObjects(state);
-  pushTabPadding();
-  const bool has_tabs = ImGui::BeginTabBar("tabs");
-  ImGui::PopStyleVar();
-  if (has_tabs) {
-    if (const Tab open{"Colour", footer}) drawColour(state, facts, actions);
-    if (const Tab open{"Objects", footer, has_more}) drawObjects(state, facts, actions);
-    if (const Tab open{"View", footer}) drawView(state, actions, facts);
-    if (facts.playback && facts.playback->steps() > 1)
-      if (const Tab open{"Time", footer}) drawTime(actions, *facts.playback);
-    ImGui::EndTabBar();
-  }
+  const bool is_series = facts.playback && facts.playback->steps() > 1;
+  const int shown = drawTabs(is_series ? 4 : 3, has_more ? 1 : -1);
+  // Each tab scrolls by itself. The scroll bar is always there, so that widgets keep their width.
+  ImGui::BeginChild(kTabs[shown], {0, -footer}, false, ImGuiWindowFlags_AlwaysVerticalScrollbar);
+  if (shown == 0) drawColour(state, facts, actions);
+  if (shown == 1) drawObjects(state, facts, actions);
+  if (shown == 2) drawView(state, actions, facts);
+  if (shown == 3) drawTime(actions, *facts.playback);
+  ImGui::EndChild();
   actions.changed |= actions.function_changed;
   drawFooter(actions);
   ImGui::End();

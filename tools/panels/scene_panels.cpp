@@ -58,7 +58,7 @@ void opacitySlider(const char* text, const std::string& name, double& opacity, P
   nameWidget(name);
 }
 
-/// Where a button "remove" at the right end of a line begins.
+/// Returns where a button "remove" at the right end of a line begins.
 float removeFrom() {
   return ImGui::GetContentRegionMax().x - ImGui::CalcTextSize("remove").x -
          2 * ImGui::GetStyle().FramePadding.x;

@@ -11,6 +11,7 @@
 #include "stream/cache/probe.h"
 #include "tools/view/edited_function.h"
 #include "tools/view/first_view.h"
+#include "tools/view/picture_layout.h"
 
 namespace curvisplat {
 namespace {
@@ -80,12 +81,18 @@ ServedCaches::ServedCaches(const std::vector<fs::path>& paths) {
   }
 }
 
-/// The camera was chosen for the usual shape of a window; a narrower one sees as much of the data's width.
+/// The camera was chosen for the usual shape of a window; in a narrower one it is further away, and sees as much of the
+/// data's width.
 ViewState ServedCaches::firstView(size_t cache, ImageSize size) const {
   ViewState state = caches_[cache].first;
-  const double usual = static_cast<double>(kFirstSize.width) / kFirstSize.height;
-  const double narrower = usual * size.height / size.width;
-  if (narrower > 1) state.camera.parallel_scale *= narrower;
+  const auto aspect_in = [&](ImageSize picture) {
+    const ImageSize data = dataSizeOf(state, caches_[cache].reader.manifest(), picture);
+    return static_cast<double>(data.width) / data.height;
+  };
+  const double narrower = std::max(1.0, aspect_in(kFirstSize) / aspect_in(size));
+  Camera& camera = state.camera;
+  camera.parallel_scale *= narrower;
+  camera.position = camera.focal_point + narrower * (camera.position - camera.focal_point);
   return state;
 }
 

@@ -236,7 +236,7 @@ void addSurfaceOpacities(const ViewState& state, CommandLine& words) {
   for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
 }
 
-/// What is hidden is left out.
+/// Adds options for surfaces, slices and isosurfaces, except for those that are hidden.
 void addSurfaces(const ViewState& state, CommandLine& words) {
   std::vector<std::string> colours;
   const auto add = [&](const std::string& name, const glm::vec3& colour) {

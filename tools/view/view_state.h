@@ -121,7 +121,7 @@ struct ViewState {
   FrameOptions frameOptions(ImageSize size) const;
 };
 
-/// Those that are not hidden.
+/// Returns those that are not hidden.
 std::vector<ClipPlane> visiblePlanes(const std::vector<ListedPlane>& planes);
 
 /// The initial state without a look at the data: the first scalar that varies with a preset, and the data

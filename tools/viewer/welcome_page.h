@@ -1,4 +1,4 @@
-// What the window shows before anything is open: how to open a file, an example, and what was opened before.
+// The page that the window shows before anything is open: how to open a file, an example, and what was opened before.
 #pragma once
 
 #include <cstddef>

@@ -17,7 +17,7 @@ namespace {
 constexpr double kShortestSeconds = 4, kPerLetterSeconds = 0.06, kErrorSeconds = 60;
 constexpr size_t kMaxShown = 3, kMaxLog = 100;
 
-/// In the window's words: its own text names options.
+/// Describes the error in the window's words: its own text names options.
 std::string textOf(const TooLittleMemory& error) {
   constexpr const char* kWhere = "raise \"memory\" under View, Detail and memory";
   if (error.least_bytes > 0)
