@@ -242,7 +242,7 @@ def measure(arguments, name, blocks):
             _, up, back = axes_of(view)
             run("render", cache, "-o", picture, "--size", f"{PIXELS}x{PIXELS}", "--tf", chosen, f"--opacity-unit={size / 3}",
                 f"--position={point(centre + size * back)}", f"--focal-point={point(centre)}", f"--view-up={point(up)}",
-                "--parallel-scale", scale, "--lod-pixels", 0, "--backend", "cpu")
+                "--parallel-scale", scale, "--lod-pixels", 0, "--backend", "cpu", "--background", "white")
             depth = -np.log(np.clip(read_pfm(picture), 1e-12, 1)) * (size / 3) / np.log(2)
             depths.append(depth.sum() * (2 * scale / PIXELS) ** 2 / volume)
             if what == "above":

@@ -19,18 +19,19 @@ namespace {
 
 constexpr uint64_t kMaxCount = std::numeric_limits<uint64_t>::max();
 
-uint64_t productOf(uint64_t a, uint64_t b, const GridBlock& block, uint32_t parts) {
+uint64_t productOf(uint64_t a, uint64_t b, const GridBlock& block, const Cuts& cuts) {
   if (b != 0 && a > kMaxCount / b)
     throw Error("block {} has {}x{}x{} nodes, too many to be refined {} times", block.name, block.ni,
-                block.nj, block.nk, parts);
+                block.nj, block.nk, cutsText(cuts));
   return a * b;
 }
 
-GridBlock refinedBlock(const GridBlock& block, uint32_t parts) {
+GridBlock refinedBlock(const GridBlock& block, const Cuts& cuts) {
   GridBlock out = block;
-  for (uint64_t* const count : {&out.ni, &out.nj, &out.nk})
-    if (*count > 1) *count = productOf(*count - 1, parts, block, parts) + 1;
-  productOf(productOf(out.ni, out.nj, block, parts), out.nk, block, parts);
+  const std::array<uint64_t*, 3> counts{&out.ni, &out.nj, &out.nk};
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (*counts[axis] > 1) *counts[axis] = productOf(*counts[axis] - 1, cuts[axis], block, cuts) + 1;
+  productOf(productOf(out.ni, out.nj, block, cuts), out.nk, block, cuts);
   return out;
 }
 
@@ -61,8 +62,9 @@ class PartsBetween {
 struct PlaceBetween {
   size_t at = 0;                    // of the lowest of them
   size_t axes = 0;                  // along which it lies between two
-  std::array<size_t, 3> steps{};    // [axis] from the lower to the higher one
-  std::array<uint32_t, 3> parts{};  // [axis] from the lower one
+  std::array<size_t, 3> steps{};    // [n of these axes] from the lower to the higher one
+  std::array<uint32_t, 3> parts{};  // [n of these axes] from the lower one
+  std::array<size_t, 3> along{};    // [n of these axes] its number: 0 for i, 1 for j, 2 for k
 
   /// The number of nodes around it: 1, 2, 4 or 8.
   size_t corners() const { return size_t{1} << axes; }
@@ -75,29 +77,29 @@ struct PlaceBetween {
 
 /// A face's nodes are the mean of both orders of its axes: another block may have them the other way round.
 template <typename Value>
-double valueBetween(const Value* values, const PlaceBetween& place, const PartsBetween& between) {
+double valueBetween(const Value* values, const PlaceBetween& place,
+                    const std::array<PartsBetween, 3>& between) {
   const std::array<size_t, 3>& step = place.steps;
-  const std::array<uint32_t, 3>& part = place.parts;
-  const auto line = [&](size_t at, size_t axis) {
-    return between(values[at], values[at + step[axis]], part[axis]);
+  const auto part_of = [&](double first, double last, size_t axis) {
+    return between[place.along[axis]](first, last, place.parts[axis]);
   };
+  const auto line = [&](size_t at, size_t axis) { return part_of(values[at], values[at + step[axis]], axis); };
   const auto face = [&](size_t at) {
-    return 0.5 * (between(line(at, 0), line(at + step[1], 0), part[1]) +
-                  between(line(at, 1), line(at + step[0], 1), part[0]));
+    return 0.5 * (part_of(line(at, 0), line(at + step[1], 0), 1) + part_of(line(at, 1), line(at + step[0], 1), 0));
   };
   if (place.axes == 1) return line(place.at, 0);
   if (place.axes == 2) return face(place.at);
-  return between(face(place.at), face(place.at + step[2]), part[2]);
+  return part_of(face(place.at), face(place.at + step[2]), 2);
 }
 
 /// The nodes of the grid around a box of refined ones, and the way from the refined indices into their arrays.
 class NodesAround {
  public:
-  NodesAround(const GridBlock& grid, const GridBlock& refined, const NodeBox& box, uint32_t parts)
-      : parts_(parts) {
-    std::tie(box_.i0, box_.i1) = planesAround(box.i0, box.endOfRow(refined.ni), grid.ni, parts);
-    std::tie(box_.j0, box_.j1) = planesAround(box.j0, box.j1, grid.nj, parts);
-    std::tie(box_.k0, box_.k1) = planesAround(box.k0, box.k1, grid.nk, parts);
+  NodesAround(const GridBlock& grid, const GridBlock& refined, const NodeBox& box, const Cuts& cuts)
+      : cuts_{cuts[0], cuts[1], cuts[2]} {
+    std::tie(box_.i0, box_.i1) = planesAround(box.i0, box.endOfRow(refined.ni), grid.ni, cuts[0]);
+    std::tie(box_.j0, box_.j1) = planesAround(box.j0, box.j1, grid.nj, cuts[1]);
+    std::tie(box_.k0, box_.k1) = planesAround(box.k0, box.k1, grid.nk, cuts[2]);
     first_ = {box_.i0, box_.j0, box_.k0};
     counts_ = {box_.i1 - box_.i0, box_.j1 - box_.j0, box_.k1 - box_.k0};
     strides_ = {1, counts_[0], counts_[0] * counts_[1]};
@@ -108,10 +110,11 @@ class NodesAround {
   PlaceBetween placeOf(const std::array<uint64_t, 3>& node) const {
     PlaceBetween place;
     for (size_t axis = 0; axis < 3; ++axis) {
-      place.at += (node[axis] / parts_ - first_[axis]) * strides_[axis];
-      const auto part = static_cast<uint32_t>(node[axis] % parts_);
+      place.at += (node[axis] / cuts_[axis] - first_[axis]) * strides_[axis];
+      const auto part = static_cast<uint32_t>(node[axis] % cuts_[axis]);
       if (part == 0) continue;
       place.steps[place.axes] = strides_[axis];
+      place.along[place.axes] = axis;
       place.parts[place.axes++] = part;
     }
     return place;
@@ -134,9 +137,9 @@ class NodesAround {
     size_t at = 0;
     std::array<size_t, 3> back{};  // to the cell before, along axes where the node is on its border
     for (size_t axis = 0; axis < 3; ++axis) {
-      const uint64_t plane = node[axis] / parts_ - first_[axis];
+      const uint64_t plane = node[axis] / cuts_[axis] - first_[axis];
       at += plane * strides_[axis];
-      if (node[axis] % parts_ == 0 && plane > 0) back[axis] = strides_[axis];
+      if (node[axis] % cuts_[axis] == 0 && plane > 0) back[axis] = strides_[axis];
     }
     for (const size_t i : {size_t{0}, back[0]})
       for (const size_t j : {size_t{0}, back[1]})
@@ -146,7 +149,7 @@ class NodesAround {
   }
 
  private:
-  uint64_t parts_;
+  std::array<uint64_t, 3> cuts_;
   NodeBox box_;
   std::array<uint64_t, 3> first_{}, counts_{}, strides_{};
 };
@@ -161,17 +164,25 @@ void forEachNode(const NodeBox& box, uint64_t ni, const Take& take) {
 
 class RefinedSource final : public ForwardingGrid {
  public:
-  RefinedSource(std::unique_ptr<GridSource> source, uint32_t parts, std::optional<double> blank_value)
-      : ForwardingGrid(std::move(source)), parts_(parts), between_(parts) {
+  RefinedSource(std::unique_ptr<GridSource> source, const Refinement& refinement,
+                std::optional<double> blank_value)
+      : ForwardingGrid(std::move(source)) {
     if (blank_value) blank_value_ = static_cast<float>(*blank_value);
-    for (GridBlock& block : description_.blocks) block = refinedBlock(block, parts);
+    for (uint32_t block = 0; block < description_.blocks.size(); ++block) {
+      const Cuts& cuts = cuts_.emplace_back(refinement.cutsOf(block));
+      between_.push_back({PartsBetween(cuts[0]), PartsBetween(cuts[1]), PartsBetween(cuts[2])});
+      description_.blocks[block] = refinedBlock(description_.blocks[block], cuts);
+      least_along_rows_ = std::min(least_along_rows_, cuts[0]);
+    }
     for (GridBoundary& boundary : description_.boundaries)
       for (size_t axis = 0; axis < 3; ++axis) {
-        boundary.first[axis] *= parts;
-        boundary.last[axis] *= parts;
+        boundary.first[axis] *= cuts_.at(boundary.block)[axis];
+        boundary.last[axis] *= cuts_.at(boundary.block)[axis];
       }
-    description_.refined *= parts;
-    description_.format += fmt::format(", refined {0} x {0} x {0}", parts);
+    description_.refinement = refinement;
+    description_.format += refinement.of_blocks.empty()
+                               ? fmt::format(", refined {}", cutsText(refinement.cutsOf(0)))
+                               : ", refined by need";
   }
 
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
@@ -179,6 +190,7 @@ class RefinedSource final : public ForwardingGrid {
     const NodesAround around = aroundOf(block, box);
     NodeArrays grid;
     ForwardingGrid::read(block, around.box(), scalars, grid);
+    const std::array<PartsBetween, 3>& between = between_[block];
     const uint64_t ni = description_.blocks[block].ni;
     const size_t count = box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0);
     for (auto* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
@@ -187,19 +199,20 @@ class RefinedSource final : public ForwardingGrid {
     size_t at = 0;
     forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
       const PlaceBetween place = around.placeOf(node);
-      out.x[at] = valueAt(grid.x, place);
-      out.y[at] = valueAt(grid.y, place);
-      out.z[at] = valueAt(grid.z, place);
+      out.x[at] = valueAt(grid.x, place, between);
+      out.y[at] = valueAt(grid.y, place, between);
+      out.z[at] = valueAt(grid.z, place, between);
       for (size_t n = 0; n < scalars.size(); ++n)
         out.scalars[n][at] =
-            isOfCells(scalars[n]) ? grid.scalars[n][place.at] : valueAt(grid.scalars[n], place);
+            isOfCells(scalars[n]) ? grid.scalars[n][place.at] : valueAt(grid.scalars[n], place, between);
       ++at;
     });
     fillBlanks(around, box, ni, missingOf(scalars, grid), grid.blank, out.blank);
   }
 
   uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
-    return (source().rowsInMemory(scalars) + parts_ - 1) / parts_;  // the grid's rows are shorter
+    // The grid's rows are shorter.
+    return (source().rowsInMemory(scalars) + least_along_rows_ - 1) / least_along_rows_;
   }
 
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
@@ -219,7 +232,7 @@ class RefinedSource final : public ForwardingGrid {
 
  private:
   NodesAround aroundOf(uint32_t block, const NodeBox& box) const {
-    return {source().description().blocks.at(block), description_.blocks.at(block), box, parts_};
+    return {source().description().blocks.at(block), description_.blocks.at(block), box, cuts_[block]};
   }
 
   bool isOfCells(uint32_t scalar) const {
@@ -228,9 +241,10 @@ class RefinedSource final : public ForwardingGrid {
 
   /// The grid's own nodes keep their bits.
   template <typename Value>
-  Value valueAt(const std::vector<Value>& values, const PlaceBetween& place) const {
+  static Value valueAt(const std::vector<Value>& values, const PlaceBetween& place,
+                       const std::array<PartsBetween, 3>& between) {
     if (place.axes == 0) return values[place.at];
-    return static_cast<Value>(valueBetween(values.data(), place, between_));
+    return static_cast<Value>(valueBetween(values.data(), place, between));
   }
 
   /// [node of the grid]: whether it is not there.
@@ -263,8 +277,9 @@ class RefinedSource final : public ForwardingGrid {
     });
   }
 
-  const uint32_t parts_;
-  const PartsBetween between_;
+  std::vector<Cuts> cuts_;                            // [block]
+  std::vector<std::array<PartsBetween, 3>> between_;  // [block][axis]
+  uint32_t least_along_rows_ = std::numeric_limits<uint32_t>::max();
   std::optional<float> blank_value_;
 };
 
