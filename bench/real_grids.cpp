@@ -31,6 +31,7 @@
 #include "bench/vtk_job.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/grid/grid_views.h"
+#include "preprocess/survey/cell_bends.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
@@ -146,7 +147,7 @@ struct Settings {
   std::filesystem::path folder, data;
   std::string only = ".*", views = ".*", json;
   int pixels = 256, rays = 1;
-  uint32_t refine = 1;
+  uint32_t refine = 1;  // 0: by need
   double lod_pixels = 0, voxel_pixels = 0;
   bool for_vtk = false, keep_drawn = false;
 };
@@ -202,7 +203,7 @@ class Measurement {
     const OpenGrid grid(named);
     const std::filesystem::path cache = settings_.folder / (grid.name + ".splats");
     if (settings_.voxel_pixels == 0)
-      convertGrid(*refined(named.open(), settings_.refine), cache, grid.scalar);
+      convertGrid(*refined(named.open(), refinementOf(*grid.source)), cache, grid.scalar);
     PictureSheet sheet(size_, 1);
     for (const NamedView& view : chosenViews(grid)) {
       std::vector<Image> pictures;
@@ -223,6 +224,10 @@ class Measurement {
   }
 
  private:
+  Refinement refinementOf(const GridSource& source) const {
+    return settings_.refine == 0 ? refinementByNeed(source) : Refinement(settings_.refine);
+  }
+
   std::vector<NamedView> chosenViews(const OpenGrid& grid) const {
     const auto [lower, upper] = grid.field.bounds();
     std::vector<NamedView> views = viewsOf(lower, upper, size_);
@@ -389,9 +394,11 @@ int run(int argc, char** argv) {
   app.add_option("--rays", settings.rays,
                  "Average the marched pictures of the uniform medium over N x N rays a pixel (default 1)")
       ->check(CLI::Range(1, 16));
-  app.add_option("--refine", settings.refine,
-                 "Convert each grid with its cells cut into N x N x N by their trilinear map (default 1)")
-      ->check(CLI::Range(1, 16));
+  app.add_option(
+         "--refine", settings.refine,
+         "Convert each grid with its cells cut into N x N x N by their trilinear map, or with 0 by need "
+         "(default 1)")
+      ->check(CLI::Range(0, 16));
   app.add_option("--lod-pixels", settings.lod_pixels, "Screen error (default 0: the finest level)");
   app.add_option("--voxel-pixels", settings.voxel_pixels,
                  "Merge the finest splats into voxels of this size instead, as coarse levels do; not for "

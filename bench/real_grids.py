@@ -78,7 +78,7 @@ def parsed():
     parser.add_argument("--views", default=".*", help="regular expression of the views: +x, '+x 0.1', ..., iso")
     parser.add_argument("--pixels", default="256", help="width and height of the pictures")
     parser.add_argument("--rays", default="1", help="average the uniform medium's truth over N x N rays a pixel")
-    parser.add_argument("--refine", default="1", help="convert with each cell cut into N x N x N; the truth stays that of the grid")
+    parser.add_argument("--refine", default="1", help="convert with each cell cut into N x N x N, or with 0 as --refine auto does; the truth stays that of the grid")
     parser.add_argument("--lod-pixels", default="0", help="screen error; 0 is the finest level")
     parser.add_argument("--technique", default=TECHNIQUES[0], choices=TECHNIQUES, help="VTK's")
     parser.add_argument("--without-vtk", action="store_true")

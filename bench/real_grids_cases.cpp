@@ -127,6 +127,8 @@ std::vector<RealGrid> realGrids(const std::filesystem::path& data) {
   add("leading_edge", "i", {{"nek/leadingEdge_block.xyz", ""}});
   add("delta_wing", "Density", {{"delta_wing/delta_vertex.cgns", ""}});
   add("sduct", "k", {{"fortran/sduct.new.x.bin", ""}});
+  add("o_mesh", "k", {{"idwarp/o_mesh.cgns", ""}});
+  add("symm_block", "k", {{"idwarp/symm_block.cgns", ""}});
   add("sqnz", "Density", {{"cgns/sqnz_s.hdf.cgns", ""}});
   add("5blocks", "k", {{"cgns/5blocks.cgns", ""}});
   add("abutting", "i", {{"overset/cylinder_chimera_abutting.x", ""}});

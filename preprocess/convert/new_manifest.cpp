@@ -49,7 +49,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.cells = origin.centring() == Centring::kCell;
   if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);
   if (description.pieces.empty()) manifest.stretch = kDualCells;
-  manifest.refined = description.refined;
+  manifest.refinement = description.refinement;
   manifest.nodes = survey.nodes;
   manifest.blanked_nodes = survey.blanked.total();
   manifest.grid_checksum = survey.grid_checksum;

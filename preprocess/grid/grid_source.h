@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+#include "stream/model/refinement.h"
+
 namespace curvisplat {
 
 /// Half-open ranges of node indices of one block, the unit of reading: j0 <= j < j1, k0 <= k < k1, and all
@@ -86,15 +88,15 @@ struct GridDescription {
   std::vector<MeshPiece> pieces;    // of an unstructured one
   std::vector<GridScalar> scalars;  // all that can be read
   std::vector<GridBoundary> boundaries;
-  std::vector<FlowConditions> flow;  // for every block of every file that has them
-  GasModel gas;                      // as stored in the files
-  int coordinate_bytes = 4;          // 4 or 8: the stored precision of the coordinates
-  std::vector<double> times;         // of every time step; empty: the files have none
-  uint32_t time_step = 0;            // index of the open one
-  std::string time_unit, calendar;   // of the times, by the CF conventions; may be empty
-  uint32_t refined = 1;              // parts that a cell of the files is cut into along each axis; 1: not cut
-  std::string blanking;              // the files' rule for blanking in words; empty: iblank or the like
-  std::string undefined;             // fill values, which are read as NaN: "T = -999"; may be empty
+  std::vector<FlowConditions> flow;   // for every block of every file that has them
+  GasModel gas;                       // as stored in the files
+  int coordinate_bytes = 4;           // 4 or 8: the stored precision of the coordinates
+  std::vector<double> times;          // of every time step; empty: the files have none
+  uint32_t time_step = 0;             // index of the open one
+  std::string time_unit, calendar;    // of the times, by the CF conventions; may be empty
+  Refinement refinement;              // the parts that cells of the files are cut into
+  std::string blanking;               // the files' rule for blanking in words; empty: iblank or the like
+  std::string undefined;              // fill values, which are read as NaN: "T = -999"; may be empty
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
   std::vector<std::string> notes;     // what the files say besides: "boundaries BCWall 3, BCInflow 1"
 };

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -40,14 +41,14 @@ std::vector<uint32_t> orderByName(const std::vector<GridBlock>& blocks,
 /// lists the zones of the earlier steps in another order.
 std::unique_ptr<GridSource> reordered(const GridSource& source, std::vector<uint32_t> order);
 
-/// The same field on smaller cells: each cell of `source` is cut into parts x parts x parts cells by its
-/// own trilinear map (the result is `source` itself if that is one); a direction with one plane of nodes
-/// keeps it. A splat has one place, shape and plane for all of its cell, so a few cells that grow or bend
+/// The same field on smaller cells: each cell of `source` is cut into parts by its own trilinear map (the
+/// result is `source` itself if that is one everywhere); a direction with one plane of nodes keeps it. A splat has one place, shape and plane for all of its cell, so a few cells that grow or bend
 /// steeply show as bands; small parts of them do not.
 ///
 /// The grid's own nodes keep their coordinates, values and blanking. New nodes are interpolated, also in
 /// derived scalars of `source`. Blocks that share the nodes of a face or an edge share the new ones there
-/// bit for bit, however their indices run; new nodes on a collapsed face coincide as well.
+/// bit for bit, however their indices run, if their cells have as many parts there; new nodes on a collapsed
+/// face coincide as well.
 ///
 /// The parts of a cell are drawn if the cell is: a new node is blanked unless it lies in a cell whose nodes
 /// are all there. A node is not there where it is blanked, or where a coordinate or one of the node-centred
@@ -55,7 +56,11 @@ std::unique_ptr<GridSource> reordered(const GridSource& source, std::vector<uint
 /// that it is interpolated from are. A part has the value of its cell.
 ///
 /// Reads the nodes around a box alone. Throws Error if there would be too many nodes to count.
-std::unique_ptr<GridSource> refined(std::unique_ptr<GridSource> source, uint32_t parts,
+std::unique_ptr<GridSource> refined(std::unique_ptr<GridSource> source, const Refinement& refinement,
                                     std::optional<double> blank_value = std::nullopt);
+inline std::unique_ptr<GridSource> refined(std::unique_ptr<GridSource> source, uint32_t parts,
+                                           std::optional<double> blank_value = std::nullopt) {
+  return refined(std::move(source), Refinement(parts), blank_value);
+}
 
 }  // namespace curvisplat

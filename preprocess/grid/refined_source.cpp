@@ -19,19 +19,19 @@ namespace {
 
 constexpr uint64_t kMaxCount = std::numeric_limits<uint64_t>::max();
 
-uint64_t productOf(uint64_t a, uint64_t b, const GridBlock& block, const Cuts& cuts) {
+uint64_t productOf(uint64_t a, uint64_t b, const GridBlock& block, const CellCuts& parts) {
   if (b != 0 && a > kMaxCount / b)
     throw Error("block {} has {}x{}x{} nodes, too many to be refined {} times", block.name, block.ni,
-                block.nj, block.nk, cutsText(cuts));
+                block.nj, block.nk, textOf(parts));
   return a * b;
 }
 
-GridBlock refinedBlock(const GridBlock& block, const Cuts& cuts) {
+GridBlock refinedBlock(const GridBlock& block, const CellCuts& parts) {
   GridBlock out = block;
   const std::array<uint64_t*, 3> counts{&out.ni, &out.nj, &out.nk};
   for (size_t axis = 0; axis < 3; ++axis)
-    if (*counts[axis] > 1) *counts[axis] = productOf(*counts[axis] - 1, cuts[axis], block, cuts) + 1;
-  productOf(productOf(out.ni, out.nj, block, cuts), out.nk, block, cuts);
+    if (*counts[axis] > 1) *counts[axis] = productOf(*counts[axis] - 1, parts[axis], block, parts) + 1;
+  productOf(productOf(out.ni, out.nj, block, parts), out.nk, block, parts);
   return out;
 }
 
@@ -83,9 +83,12 @@ double valueBetween(const Value* values, const PlaceBetween& place,
   const auto part_of = [&](double first, double last, size_t axis) {
     return between[place.along[axis]](first, last, place.parts[axis]);
   };
-  const auto line = [&](size_t at, size_t axis) { return part_of(values[at], values[at + step[axis]], axis); };
+  const auto line = [&](size_t at, size_t axis) {
+    return part_of(values[at], values[at + step[axis]], axis);
+  };
   const auto face = [&](size_t at) {
-    return 0.5 * (part_of(line(at, 0), line(at + step[1], 0), 1) + part_of(line(at, 1), line(at + step[0], 1), 0));
+    return 0.5 *
+           (part_of(line(at, 0), line(at + step[1], 0), 1) + part_of(line(at, 1), line(at + step[0], 1), 0));
   };
   if (place.axes == 1) return line(place.at, 0);
   if (place.axes == 2) return face(place.at);
@@ -95,11 +98,11 @@ double valueBetween(const Value* values, const PlaceBetween& place,
 /// The nodes of the grid around a box of refined ones, and the way from the refined indices into their arrays.
 class NodesAround {
  public:
-  NodesAround(const GridBlock& grid, const GridBlock& refined, const NodeBox& box, const Cuts& cuts)
-      : cuts_{cuts[0], cuts[1], cuts[2]} {
-    std::tie(box_.i0, box_.i1) = planesAround(box.i0, box.endOfRow(refined.ni), grid.ni, cuts[0]);
-    std::tie(box_.j0, box_.j1) = planesAround(box.j0, box.j1, grid.nj, cuts[1]);
-    std::tie(box_.k0, box_.k1) = planesAround(box.k0, box.k1, grid.nk, cuts[2]);
+  NodesAround(const GridBlock& grid, const GridBlock& refined, const NodeBox& box, const CellCuts& parts)
+      : parts_{parts[0], parts[1], parts[2]} {
+    std::tie(box_.i0, box_.i1) = planesAround(box.i0, box.endOfRow(refined.ni), grid.ni, parts[0]);
+    std::tie(box_.j0, box_.j1) = planesAround(box.j0, box.j1, grid.nj, parts[1]);
+    std::tie(box_.k0, box_.k1) = planesAround(box.k0, box.k1, grid.nk, parts[2]);
     first_ = {box_.i0, box_.j0, box_.k0};
     counts_ = {box_.i1 - box_.i0, box_.j1 - box_.j0, box_.k1 - box_.k0};
     strides_ = {1, counts_[0], counts_[0] * counts_[1]};
@@ -110,8 +113,8 @@ class NodesAround {
   PlaceBetween placeOf(const std::array<uint64_t, 3>& node) const {
     PlaceBetween place;
     for (size_t axis = 0; axis < 3; ++axis) {
-      place.at += (node[axis] / cuts_[axis] - first_[axis]) * strides_[axis];
-      const auto part = static_cast<uint32_t>(node[axis] % cuts_[axis]);
+      place.at += (node[axis] / parts_[axis] - first_[axis]) * strides_[axis];
+      const auto part = static_cast<uint32_t>(node[axis] % parts_[axis]);
       if (part == 0) continue;
       place.steps[place.axes] = strides_[axis];
       place.along[place.axes] = axis;
@@ -137,9 +140,9 @@ class NodesAround {
     size_t at = 0;
     std::array<size_t, 3> back{};  // to the cell before, along axes where the node is on its border
     for (size_t axis = 0; axis < 3; ++axis) {
-      const uint64_t plane = node[axis] / cuts_[axis] - first_[axis];
+      const uint64_t plane = node[axis] / parts_[axis] - first_[axis];
       at += plane * strides_[axis];
-      if (node[axis] % cuts_[axis] == 0 && plane > 0) back[axis] = strides_[axis];
+      if (node[axis] % parts_[axis] == 0 && plane > 0) back[axis] = strides_[axis];
     }
     for (const size_t i : {size_t{0}, back[0]})
       for (const size_t j : {size_t{0}, back[1]})
@@ -149,7 +152,7 @@ class NodesAround {
   }
 
  private:
-  std::array<uint64_t, 3> cuts_;
+  std::array<uint64_t, 3> parts_;
   NodeBox box_;
   std::array<uint64_t, 3> first_{}, counts_{}, strides_{};
 };
@@ -169,20 +172,19 @@ class RefinedSource final : public ForwardingGrid {
       : ForwardingGrid(std::move(source)) {
     if (blank_value) blank_value_ = static_cast<float>(*blank_value);
     for (uint32_t block = 0; block < description_.blocks.size(); ++block) {
-      const Cuts& cuts = cuts_.emplace_back(refinement.cutsOf(block));
-      between_.push_back({PartsBetween(cuts[0]), PartsBetween(cuts[1]), PartsBetween(cuts[2])});
-      description_.blocks[block] = refinedBlock(description_.blocks[block], cuts);
-      least_along_rows_ = std::min(least_along_rows_, cuts[0]);
+      const CellCuts& parts = parts_.emplace_back(refinement.ofBlock(block));
+      between_.push_back({PartsBetween(parts[0]), PartsBetween(parts[1]), PartsBetween(parts[2])});
+      description_.blocks[block] = refinedBlock(description_.blocks[block], parts);
+      least_along_rows_ = std::min(least_along_rows_, parts[0]);
     }
     for (GridBoundary& boundary : description_.boundaries)
       for (size_t axis = 0; axis < 3; ++axis) {
-        boundary.first[axis] *= cuts_.at(boundary.block)[axis];
-        boundary.last[axis] *= cuts_.at(boundary.block)[axis];
+        boundary.first[axis] *= parts_.at(boundary.block)[axis];
+        boundary.last[axis] *= parts_.at(boundary.block)[axis];
       }
     description_.refinement = refinement;
-    description_.format += refinement.of_blocks.empty()
-                               ? fmt::format(", refined {}", cutsText(refinement.cutsOf(0)))
-                               : ", refined by need";
+    description_.format += refinement.isUniform() ? fmt::format(", refined {}", textOf(refinement.ofBlock(0)))
+                                                  : ", refined by need";
   }
 
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
@@ -232,7 +234,7 @@ class RefinedSource final : public ForwardingGrid {
 
  private:
   NodesAround aroundOf(uint32_t block, const NodeBox& box) const {
-    return {source().description().blocks.at(block), description_.blocks.at(block), box, cuts_[block]};
+    return {source().description().blocks.at(block), description_.blocks.at(block), box, parts_[block]};
   }
 
   bool isOfCells(uint32_t scalar) const {
@@ -277,7 +279,7 @@ class RefinedSource final : public ForwardingGrid {
     });
   }
 
-  std::vector<Cuts> cuts_;                            // [block]
+  std::vector<CellCuts> parts_;                       // [block]
   std::vector<std::array<PartsBetween, 3>> between_;  // [block][axis]
   uint32_t least_along_rows_ = std::numeric_limits<uint32_t>::max();
   std::optional<float> blank_value_;
@@ -285,11 +287,13 @@ class RefinedSource final : public ForwardingGrid {
 
 }  // namespace
 
-std::unique_ptr<GridSource> refined(std::unique_ptr<GridSource> source, uint32_t parts,
+std::unique_ptr<GridSource> refined(std::unique_ptr<GridSource> source, const Refinement& refinement,
                                     std::optional<double> blank_value) {
-  CURVISPLAT_CHECK(parts > 0);
-  if (parts == 1) return source;
-  return std::make_unique<RefinedSource>(std::move(source), parts, blank_value);
+  CURVISPLAT_CHECK(refinement.isUniform() ||
+                   refinement.ofBlocks().size() == source->description().blocks.size());
+  CURVISPLAT_CHECK(!source->description().refinement.cutsCells());
+  if (!refinement.cutsCells()) return source;
+  return std::make_unique<RefinedSource>(std::move(source), refinement, blank_value);
 }
 
 }  // namespace curvisplat

@@ -122,9 +122,9 @@ struct Candidate {
 };
 
 /// Goes down the octree, the largest detail first, as far as the limit allows and the splats do not become faint.
-class Refinement {
+class FinestChoice {
  public:
-  Refinement(const CacheReader& cache, const Classifier& classifier, uint64_t max_splats)
+  FinestChoice(const CacheReader& cache, const Classifier& classifier, uint64_t max_splats)
       : cache_(cache), classifier_(classifier), max_splats_(max_splats) {
     for (uint32_t n = 0; n < cache.bricks().size() && cache.bricks()[n].parent == kNoBrick; ++n) take(n);
     if (splats_ > max_splats)
@@ -230,7 +230,7 @@ std::vector<GaussianSplat> gaussianSplats(const CacheReader& cache, size_t varia
                                           Progress& progress) {
   const VariableInfo& info = cache.manifest().variables.at(variable);
   const Classifier classifier{cache, variable, ClassificationTable::of(function, info.min, info.max)};
-  return Refinement(cache, classifier, max_splats).run(progress);
+  return FinestChoice(cache, classifier, max_splats).run(progress);
 }
 
 namespace {

@@ -89,6 +89,30 @@ void readRoot(const JsonField& fields, Manifest& manifest) {
     if (manifest.lower[axis] > manifest.upper[axis]) fields.at("lower").fail("at most 'upper'");
 }
 
+uint32_t partsIn(const JsonField& field) {
+  return static_cast<uint32_t>(field.count(1, kLargestRefinement));
+}
+
+void readBlocks(const JsonField& fields, Manifest& manifest) {
+  std::vector<CellCuts> of_blocks;
+  bool any = false;
+  for (const JsonField& block : fields.at("blocks").elements()) {
+    manifest.blocks.push_back({lineOf(block.at("name")), block.at("ni").count(1), block.at("nj").count(1),
+                               block.at("nk").count(1)});
+    CellCuts& parts = of_blocks.emplace_back(kWholeCells);
+    const auto refined = block.find("refined");
+    if (!refined) continue;
+    any = true;
+    const std::vector<JsonField> axes = refined->elements();
+    if (axes.size() != parts.size()) refined->fail("three integers");
+    std::transform(axes.begin(), axes.end(), parts.begin(), partsIn);
+  }
+  if (const auto refined = fields.find("refined"))
+    manifest.refinement = Refinement(partsIn(*refined));
+  else if (any)
+    manifest.refinement = Refinement(std::move(of_blocks));
+}
+
 /// Whether the samples are cells.
 bool readCentring(const JsonField& fields) {
   const auto centring = fields.find("centring");
@@ -206,10 +230,14 @@ std::string Manifest::toJson() const {
   json["lower"] = jsonOf(lower);
   json["upper"] = jsonOf(upper);
   json["blocks"] = Json::array();
-  for (const BlockInfo& block : blocks)
+  for (size_t n = 0; n < blocks.size(); ++n) {
+    const BlockInfo& block = blocks[n];
     json["blocks"].push_back({{"name", block.name}, {"ni", block.ni}, {"nj", block.nj}, {"nk", block.nk}});
+    const CellCuts& parts = refinement.ofBlock(n);
+    if (!refinement.isUniform() && parts != kWholeCells) json["blocks"].back()["refined"] = parts;
+  }
   if (cells) json["centring"] = "cell";
-  if (refined > 1) json["refined"] = refined;
+  if (refinement.isUniform() && refinement.cutsCells()) json["refined"] = refinement.parts();
   json["nodes"] = nodes;
   json["blanked_nodes"] = blanked_nodes;
   json["splats"] = splats;
@@ -272,12 +300,8 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   manifest.sources = linesOf(fields.at("sources"));
   manifest.reader = lineOf(fields.at("reader"));
   readRoot(fields, manifest);
-  for (const JsonField& block : fields.at("blocks").elements())
-    manifest.blocks.push_back({lineOf(block.at("name")), block.at("ni").count(1), block.at("nj").count(1),
-                               block.at("nk").count(1)});
+  readBlocks(fields, manifest);
   manifest.cells = readCentring(fields);
-  if (const auto refined = fields.find("refined"))
-    manifest.refined = static_cast<uint32_t>(refined->count(1, kLargestRefinement));
   manifest.nodes = fields.at("nodes").count();
   manifest.blanked_nodes = fields.at("blanked_nodes").count(0, manifest.nodes);
   manifest.splats = fields.at("splats").count(1);

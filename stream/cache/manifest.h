@@ -17,6 +17,7 @@
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
 #include "stream/model/octree.h"
+#include "stream/model/refinement.h"
 
 namespace curvisplat {
 
@@ -108,9 +109,9 @@ struct Manifest {
   RootCube root;
   glm::dvec3 lower{0.0}, upper{0.0};  // bounding box of the grid's nodes, world units
   std::vector<BlockInfo> blocks;
-  bool cells = false;    // samples are the grid's cells, not its nodes; runs name a cell by its lowest node
-  uint32_t refined = 1;  // each cell of the files' grid is this many along each axis
-  uint64_t nodes = 0;    // samples of the grid: nodes, or cells
+  bool cells = false;     // samples are the grid's cells, not its nodes; runs name a cell by its lowest node
+  Refinement refinement;  // of the cells of the files' grid
+  uint64_t nodes = 0;     // samples of the grid: nodes, or cells
   uint64_t blanked_nodes = 0;  // samples that are not drawn: iblank, --blank or not finite
   uint64_t splats = 0;         // at the finest level
   uint64_t bricks = 0;

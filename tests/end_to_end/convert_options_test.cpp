@@ -6,12 +6,14 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <vector>
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/file.h"
 #include "stream/base/progress.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
@@ -265,6 +267,71 @@ TEST_F(RefineCommand, ASeriesGoesOnAsItBegan) {
   EXPECT_TRUE(filesOf(folder_ / "added.splats") == filesOf(folder_ / "all.splats"));
 }
 
+/// A quarter of a ring of three cells around its axis: these bend along j, and nowhere else.
+void writeRing(const std::filesystem::path& name) {
+  const FunctionGridSource ring({gridBlock(9, 4, 5)}, 1, [](const GridNode& node) {
+    const double turn = static_cast<double>(node.j) * std::numbers::pi / 6;
+    const double radius = 8 + static_cast<double>(node.i);
+    return NodeValues{{radius * std::cos(turn), radius * std::sin(turn), static_cast<double>(node.k)},
+                      {static_cast<float>(radius)}};
+  });
+  Progress progress;
+  writePlot3d(ring, name, progress);
+}
+
+TEST_F(RefineCommand, CutsByNeed) {
+  writeRing(folder_ / "ring");
+  const auto convert_ring = [&](const std::string& cache, const Words& more) {
+    return runProgram(Words{"convert", file("ring.xyz"), file("ring.fun"), "-o", file(cache)} + more);
+  };
+  const ProgramResult whole = convert_ring("1.splats", {});
+  EXPECT_EQ(whole.status, 0);
+  expectSays(whole.err, "note: cells differ much from those beside them: a picture will show bands");
+  expectSays(whole.err, "--refine auto");
+  EXPECT_EQ(manifest("1.splats")["nodes"], 9 * 4 * 5);
+
+  const ProgramResult by_need = convert_ring("auto.splats", {"--refine", "auto", "--threads", "1"});
+  EXPECT_EQ(by_need.status, 0);
+  EXPECT_EQ(by_need.err.find("cells differ"), std::string::npos);
+  const nlohmann::json cut = manifest("auto.splats");
+  EXPECT_FALSE(cut.contains("refined"));
+  EXPECT_EQ(cut["blocks"][0]["refined"], (nlohmann::json{1, 4, 1}));
+  EXPECT_EQ(cut["nodes"], 9 * 13 * 5);
+  expectSays(runProgram({"info", file("auto.splats")}).out, "1 x 4 x 1");
+  const Files one = filesOf(folder_ / "auto.splats");
+  convert_ring("auto.splats", {"--refine", "auto", "--threads", "2", "--memory", "200M", "--overwrite"});
+  EXPECT_TRUE(filesOf(folder_ / "auto.splats") == one);
+
+  const auto add = [&](const char* scalar, const Words& more) {
+    return Words{"convert", file("ring.xyz"), "--add-scalar", scalar, "--to", file("auto.splats")} + more;
+  };
+  run(add("i", {}));
+  run(add("j", {"--refine", "auto"}));
+  expectRefused(add("k", {"--refine", "4"}), 2, {"was converted with --refine auto"});
+  run({"info", file("auto.splats"), "--verify"});
+  const ProgramResult probe = runProgram({"info", file("auto.splats"), "--probe", "8,0,0", "--source"});
+  EXPECT_EQ(probe.status, 0) << probe.err;
+
+  // The duct is even enough.
+  run(convert("even.splats", {"--refine", "auto"}));
+  run(convert("1.splats", {"--overwrite"}));
+  EXPECT_EQ(manifest("even.splats")["blocks"], manifest("1.splats")["blocks"]);
+}
+
+TEST_F(RefineCommand, AllStepsAreCutByTheNeedOfTheFirst) {
+  writeRing(folder_ / "ring");
+  for (const char* const step : {"r_0.fun", "r_1.fun", "r_2.fun"})
+    std::filesystem::copy_file(folder_ / "ring.fun", folder_ / step);
+  const auto series = [&](const std::string& cache, const Words& more) {
+    return Words{"convert", file("ring.xyz"), file("r_*.fun"), "-o", file(cache), "--refine", "auto"} + more;
+  };
+  run(series("all.splats", {}));
+  EXPECT_EQ(manifest("all.splats")["blocks"][0]["refined"], (nlohmann::json{1, 4, 1}));
+  run(series("some.splats", {"--steps", "0:1"}));
+  run(series("some.splats", {"--resume"}));
+  EXPECT_TRUE(filesOf(folder_ / "some.splats") == filesOf(folder_ / "all.splats"));
+}
+
 TEST_F(RefineCommand, RefusesWhatCannotBeRefined) {
   writeFileAtomically(folder_ / "tetrahedron.vtk",
                       "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n"
@@ -276,7 +343,8 @@ TEST_F(RefineCommand, RefusesWhatCannotBeRefined) {
   expectRefused(convert_it("2"), 1, {"--refine is for structured grids"});
   EXPECT_FALSE(std::filesystem::exists(folder_ / "t.splats"));
   run(convert_it("1"));
-  for (const char* const parts : {"0", "17", "x"}) {
+  run(convert_it("auto") + Words{"--overwrite"});
+  for (const char* const parts : {"0", "17", "x", "2x", ""}) {
     const ProgramResult result = runProgram(convert("no.splats", {"--refine", parts}));
     EXPECT_EQ(result.status, 2);
     expectSays(result.err, "--refine");

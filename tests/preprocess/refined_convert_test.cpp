@@ -81,7 +81,7 @@ TEST_F(RefinedConvert, HasTheVolumeOfTheGrid) {
       EXPECT_NEAR(report.volume / whole.volume, 1, std::string(name) == "duct" ? 1e-3 : 2e-2);
       EXPECT_GT(report.nodes, nodes);
       EXPECT_EQ(report.degenerate, 0u);
-      EXPECT_EQ(CacheReader(folder_ / fine).manifest().refined, parts);
+      EXPECT_EQ(CacheReader(folder_ / fine).manifest().refinement, Refinement(parts));
       nodes = report.nodes;
     }
   }
@@ -122,7 +122,7 @@ TEST_F(RefinedConvert, TakesFurtherScalars) {
     addScalars(*fine, options, progress);
     for (const char* const name : {"geometry.bin", "var.0.bin", "var.1.bin"})
       EXPECT_TRUE(files("added").at(name) == files("both").at(name)) << name << cells;
-    EXPECT_EQ(CacheReader(folder_ / "added").manifest().refined, 3u);
+    EXPECT_EQ(CacheReader(folder_ / "added").manifest().refinement, Refinement(3));
   }
 }
 

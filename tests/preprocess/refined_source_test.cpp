@@ -75,15 +75,15 @@ void forEachIndex(const GridBlock& block, const Visit& visit) {
 
 /// Weighted sum over the corners of the cell that a refined node lies in.
 template <typename Value, typename Of>
-Value trilinear(const Index& node, uint64_t parts, const Index& counts, const Of& of) {
+Value trilinear(const Index& node, const CellCuts& cuts, const Index& counts, const Of& of) {
   Value sum{};
   for (unsigned corner = 0; corner < 8; ++corner) {
     Index n;
     double weight = 1;
     for (size_t axis = 0; axis < 3; ++axis) {
-      const double share = static_cast<double>(node[axis] % parts) / static_cast<double>(parts);
+      const double share = static_cast<double>(node[axis] % cuts[axis]) / cuts[axis];
       const bool higher = (corner >> axis & 1) != 0;
-      n[axis] = std::min(node[axis] / parts + higher, counts[axis] - 1);
+      n[axis] = std::min(node[axis] / cuts[axis] + higher, counts[axis] - 1);
       weight *= higher ? share : 1 - share;
     }
     sum += weight * of(n);
@@ -93,21 +93,23 @@ Value trilinear(const Index& node, uint64_t parts, const Index& counts, const Of
 
 TEST(RefinedSource, CutsCellsByTheirTrilinearMap) {
   const Index counts{3, 4, 2};
-  for (const uint32_t parts : {1u, 2u, 3u, 16u}) {
-    const auto fine = refined(unevenGrid(counts), parts);
+  for (const CellCuts& cuts : {kWholeCells, CellCuts{2, 2, 2}, CellCuts{3, 3, 3}, CellCuts{16, 16, 16},
+                               CellCuts{1, 2, 1}, CellCuts{4, 1, 2}, CellCuts{2, 3, 8}}) {
+    const Refinement refinement({cuts});
+    const auto fine = refined(unevenGrid(counts), refinement);
     const GridBlock& block = fine->description().blocks[0];
-    EXPECT_EQ((Index{block.ni, block.nj, block.nk}), (Index{2 * parts + 1, 3 * parts + 1, parts + 1}));
-    EXPECT_EQ(fine->description().refined, parts);
+    EXPECT_EQ((Index{block.ni, block.nj, block.nk}), (Index{2 * cuts[0] + 1, 3 * cuts[1] + 1, cuts[2] + 1}));
+    EXPECT_EQ(fine->description().refinement, refinement);
     const NodeArrays nodes = allNodes(*fine, 0);
     ASSERT_EQ(nodes.x.size(), block.nodes());
     forEachIndex(block, [&](const Index& n) {
       const size_t at = atOf(block, n);
       const glm::dvec3 found = positionOf(nodes, at);
-      EXPECT_LT(glm::length(found - trilinear<glm::dvec3>(n, parts, counts, unevenPosition)), 1e-12 * 1e3);
-      EXPECT_NEAR(nodes.scalars[0][at], trilinear<double>(n, parts, counts, unevenValue), 1e-5);
+      EXPECT_LT(glm::length(found - trilinear<glm::dvec3>(n, cuts, counts, unevenPosition)), 1e-12 * 1e3);
+      EXPECT_NEAR(nodes.scalars[0][at], trilinear<double>(n, cuts, counts, unevenValue), 1e-5);
       EXPECT_EQ(nodes.blank[at], 0);
-      if (n[0] % parts + n[1] % parts + n[2] % parts > 0) return;
-      const Index old{n[0] / parts, n[1] / parts, n[2] / parts};
+      if (n[0] % cuts[0] + n[1] % cuts[1] + n[2] % cuts[2] > 0) return;
+      const Index old{n[0] / cuts[0], n[1] / cuts[1], n[2] / cuts[2]};
       EXPECT_EQ(found, unevenPosition(old));
       EXPECT_EQ(nodes.scalars[0][at], unevenValue(old));
     });

@@ -531,8 +531,28 @@ class Arrays(PythonTest):
             self.assertEqual(json.loads((path / "manifest.json").read_text())["refined"], 2)
             with self.assertRaises(curvisplat.UsageError):
                 convert(path, *words, overwrite=True, refine=17)
+            with self.assertRaises(curvisplat.UsageError):
+                convert(path, *words, overwrite=True, refine="some")
         for name in ("bricks.bin", "geometry.bin", "var.0.bin"):
             self.assertEqual((whole / name).read_bytes(), (of_files / name).read_bytes(), name)
+
+    def test_cells_are_cut_by_need(self):
+        x, y, z, t = bent_duct(ni=4)
+        path = self.folder / "need.splats"
+        block = curvisplat.Block(x, y, z, {"t": t})
+        curvisplat.convert_arrays(path, block, refine="auto")
+        cuts = json.loads((path / "manifest.json").read_text())["blocks"][0]["refined"]
+        self.assertGreater(cuts[0], 1)
+        self.assertEqual(cuts[1:], [1, 1])
+        # Read in threads of the conversion, which wait for the interpreter.
+        def read(block, k0, k1, j0, j1, names):
+            piece = np.s_[k0:k1, j0:j1]
+            return x[piece], y[piece], z[piece], [t[piece] for _ in names], None
+
+        of_callable = self.folder / "need_callable.splats"
+        curvisplat.convert_callable(of_callable, [t.shape], read, {"t": ""}, refine="auto")
+        for name in ("bricks.bin", "geometry.bin", "var.0.bin"):
+            self.assertEqual((path / name).read_bytes(), (of_callable / name).read_bytes(), name)
 
     def test_of_any_strides_and_layouts_are_the_same(self):
         x, y, z, t = bent_duct()

@@ -55,10 +55,15 @@ TEST(Manifest, RoundTrips) {
   EXPECT_EQ(back.files[1].checksum, ~uint64_t{0});
   EXPECT_EQ(back.blocks[1].ni, uint64_t{1} << 40);
   EXPECT_EQ(back.steps[0].variables, m.steps[0].variables);
-  EXPECT_EQ(back.refined, 1u) << "of a manifest that does not say";
+  EXPECT_FALSE(back.refinement.cutsCells()) << "of a manifest that does not say";
   Manifest refined = m;
-  refined.refined = 4;
-  EXPECT_EQ(Manifest::fromJson(refined.toJson(), "manifest.json").refined, 4u);
+  refined.refinement = Refinement(4);
+  EXPECT_EQ(Manifest::fromJson(refined.toJson(), "manifest.json").refinement, Refinement(4));
+  refined.refinement = Refinement({kWholeCells, {4, 1, 2}});
+  const Json by_need = Json::parse(refined.toJson());
+  EXPECT_FALSE(by_need.contains("refined"));
+  EXPECT_FALSE(by_need["blocks"][0].contains("refined"));
+  EXPECT_EQ(Manifest::fromJson(refined.toJson(), "manifest.json").refinement, refined.refinement);
 }
 
 TEST(Manifest, IsReadWithoutItsChecksumAndInAnyLayout) {
@@ -179,6 +184,9 @@ TEST(Manifest, RefusesWhatIsOutOfRange) {
   refused([](Json& j) { j["nodes"] = 1.5; });
   refused([](Json& j) { j["blanked_nodes"] = j["nodes"].get<uint64_t>() + 1; });
   refused([](Json& j) { j["refined"] = 0; });
+  refused([](Json& j) { j["blocks"][0]["refined"] = {1, 0, 2}; });
+  refused([](Json& j) { j["blocks"][0]["refined"] = {1, 2}; });
+  refused([](Json& j) { j["blocks"][0]["refined"] = 2; });
   refused([](Json& j) { j["splats"] = 0; });
   refused([](Json& j) { j["bricks"] = uint64_t{1} << 32; });
   refused([](Json& j) { j["levels"] = 26; });

@@ -176,9 +176,13 @@ void runConvert(ConvertArguments arguments) {
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
   options.differing = DifferingScalars::kKeepApart;
   options.title = arguments.grid.grid.stem().string();
-  if (arguments.dry_run) return dryRun(std::move(source), options, arguments);
-
   requireThreads(arguments.threads);
+  const std::string note = ranks.isFirst() ? noteOnCells(*source, arguments.threads) : "";
+  if (arguments.dry_run) {
+    if (!note.empty()) printMessage("note: {}", note);
+    return dryRun(std::move(source), options, arguments);
+  }
+
   Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
   const StopRanksWith stopping_ranks(ranks, progress);
@@ -187,6 +191,7 @@ void runConvert(ConvertArguments arguments) {
   nlohmann::json numbers = statistics(report, progress);
   numbers["ranks"] = ranks.count();
   printWarnings(source->description(), arguments.grid.time_step, report);
+  if (!note.empty()) printMessage("note: {}", note);
   printSummary(arguments, report, secondsOf(progress));
   for (const double largest : printStored(options.output)) numbers["stored_within"].push_back(largest);
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
@@ -304,8 +309,13 @@ void addConvert(CLI::App& app) {
   command
       ->add_option("--refine", arguments->refine,
                    "Cut each cell into N x N x N by its own trilinear map: for grids of few cells that grow "
-                   "or bend steeply from one to the next (default 1: as they are)")
-      ->check(CLI::Range(1u, kMaxRefinement));
+                   "or bend steeply from one to the next. auto: only where they do, along the axes that need "
+                   "it, into 2, 4 or 8 parts (default 1: as they are)")
+      ->type_name("N|auto")
+      ->check([](const std::string& text) {
+        parseRefinement("--refine", text);
+        return std::string();
+      });
   command->add_option(
       "--value-precision", arguments->precision,
       "Precision of stored values: normal (16 bits over the local range of values), auto (as normal, "

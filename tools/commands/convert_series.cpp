@@ -210,7 +210,9 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   }
   std::vector<StepFiles> own;
   for (const uint64_t place : places) own.push_back(steps[place]);
-  SeriesInput input = seriesInput(arguments, own);
+  ConvertArguments of_all = arguments;  // all parts have the same refinement
+  of_all.refinement = refinementOfSteps(arguments, partCache(folder, part), steps);
+  SeriesInput input = seriesInput(of_all, own);
   input.places = places;
   options.convert.output = partCache(folder, part);
   options.to_part = part.index > 0;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <glm/common.hpp>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,6 +27,7 @@
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/value_histogram.h"
 #include "stream/model/kernel.h"
+#include "stream/model/refinement.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
 #include "tools/commands/info_probe.h"
@@ -286,6 +288,17 @@ void printFiles(const CacheReader& reader) {
              bytesPerSample(m, of_series) / static_cast<double>(steps));
 }
 
+void printRefinement(const Manifest& m) {
+  const Refinement& refinement = m.refinement;
+  if (!refinement.cutsCells()) return;
+  std::map<CellCuts, uint64_t> blocks;
+  for (size_t n = 0; n < m.blocks.size(); ++n) ++blocks[refinement.ofBlock(n)];
+  const bool same = blocks.size() == 1;
+  for (const auto& [parts, count] : blocks)
+    fmt::print("refined    each cell of the files' grid is {} here{}\n", textOf(parts),
+               same ? "" : fmt::format(", in {}", countText(count, "block")));
+}
+
 void printAsText(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& m = reader.manifest();
   printLine("{}", m.title);
@@ -297,8 +310,7 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("volume     {:.8g}\n", m.volume);
   fmt::print("samples    {} at {} in {}, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
              countText(m.blocks.size(), "block"), m.blanked_nodes);
-  if (m.refined > 1)
-    fmt::print("refined    each cell of the files' grid is {0} x {0} x {0} here\n", m.refined);
+  printRefinement(m);
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {

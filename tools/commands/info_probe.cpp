@@ -87,7 +87,7 @@ void printPoint(std::span<const CacheReader> readers, const Probe& probe) {
   const Manifest& manifest = readers.front().manifest();
   const char* const sample = manifest.cells ? "cell" : "node";
   const std::string block = manifest.blocks.size() > 1 ? fmt::format("block {}, ", found->block + 1) : "";
-  const char* const of_refined = manifest.refined > 1 ? " in the refined grid" : "";
+  const char* const of_refined = manifest.refinement.cutsCells() ? " in the refined grid" : "";
   const char* const where = !probe.of_source ? ", the middle of whose cell is"
                             : manifest.cells ? ", whose middle is"
                                              : ",";

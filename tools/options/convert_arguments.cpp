@@ -8,16 +8,22 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <set>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/derived/derived_source.h"
 #include "preprocess/gradients/gradient_mesh.h"
 #include "preprocess/grid/grid_views.h"
+#include "preprocess/grid/parallel.h"
 #include "preprocess/mesh/mesh_source.h"
+#include "preprocess/survey/cell_bends.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/cache/series.h"
@@ -28,6 +34,7 @@
 namespace curvisplat {
 namespace {
 
+constexpr const char* kByNeed = "auto";  // of --refine
 constexpr const char* kGroup = "PLOT3D layout (default: detected)";
 constexpr const char* kGlobeGroup = "Longitude-latitude grids (NetCDF), in kilometres";
 
@@ -189,20 +196,44 @@ std::vector<uint32_t> storedScalars(const GridDescription& description) {
   return positions;
 }
 
-/// The refinement that --refine asks for, or that the cache has which is added to or continued. Throws
-/// UsageError if these differ.
-uint32_t partsFor(const ConvertArguments& arguments, const std::filesystem::path& cache) {
+/// The refinement of the cache that is added to or continued, if there is one. Throws UsageError if --refine
+/// asks for another one.
+std::optional<Refinement> refinementOf(const ConvertArguments& arguments,
+                                       const std::filesystem::path& cache) {
+  if (arguments.refinement) return arguments.refinement;
   const bool adds = arguments.adds_steps || !arguments.added_scalars.empty();
   const bool continues = arguments.resume && !arguments.overwrite;
   std::error_code ignored;  // what is wrong with a cache is said where it is changed
-  if (!(adds || continues) || !std::filesystem::exists(cache / "manifest.json", ignored))
-    return arguments.refine.value_or(1);
-  const uint32_t parts = readManifest(cache).refined;
-  if (arguments.refine && *arguments.refine != parts)
-    throw UsageError("--refine {}: {} was converted with --refine {}; leave the option out",
-                     *arguments.refine, cache.string(), parts);
-  return parts;
+  if (!(adds || continues) || !std::filesystem::exists(cache / "manifest.json", ignored)) return {};
+  const Refinement found = readManifest(cache).refinement;
+  if (arguments.refine)
+    if (const auto parts = parseRefinement("--refine", *arguments.refine);
+        parts && Refinement(*parts) != found)
+      throw UsageError("--refine {}: {} was converted with --refine {}; leave the option out", *parts,
+                       cache.string(), found.isUniform() ? fmt::to_string(found.parts()) : kByNeed);
+  return found;
 }
+
+unsigned threadsFor(unsigned given) {
+  return given > 0 ? given : static_cast<unsigned>(tbb::info::default_concurrency());
+}
+
+/// The refinement of all steps of a series, found where a step is opened first.
+class RefinementOnce {
+ public:
+  template <typename Find>
+  std::optional<Refinement> get(const Find& find) {
+    const std::scoped_lock lock(mutex_);
+    if (!is_found_) found_ = find();
+    is_found_ = true;
+    return found_;
+  }
+
+ private:
+  std::mutex mutex_;
+  bool is_found_ = false;            // guarded by mutex_
+  std::optional<Refinement> found_;  // guarded by mutex_
+};
 
 }  // namespace
 
@@ -233,14 +264,46 @@ std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments,
       if (parts.size() > 1) grid.scalars.insert(grid.scalars.end(), parts.begin(), parts.end());
     }
   std::unique_ptr<DataSource> source = openWithDerived(grid, {arguments.gas, arguments.blank_value});
-  return refinedBy(partsFor(arguments, cache), std::move(source), arguments.blank_value);
+  if (const auto refinement = refinementOf(arguments, cache))
+    return refinedBy(*refinement, std::move(source), arguments.blank_value);
+  const auto parts = parseRefinement("--refine", arguments.refine.value_or("1"));
+  const Refinement refinement = parts ? Refinement(*parts) : refinementByNeed(*source, arguments.threads);
+  return refinedBy(refinement, std::move(source), arguments.blank_value);
 }
 
-std::unique_ptr<DataSource> refinedBy(uint32_t parts, std::unique_ptr<DataSource> source,
+std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_ptr<DataSource> source,
                                       std::optional<double> blank_value) {
-  if (parts == 1) return source;
-  return refined(requireGrid(std::move(source), "cannot be refined; --refine is for structured grids"), parts,
-                 blank_value);
+  if (!refinement.cutsCells()) return source;
+  std::unique_ptr<GridSource> grid =
+      requireGrid(std::move(source), "cannot be refined; --refine is for structured grids");
+  const size_t blocks = grid->description().blocks.size();
+  if (!refinement.isUniform() && refinement.ofBlocks().size() != blocks)
+    throw Error("{}: has {} blocks; the cells of the cache's {} blocks were cut by --refine auto",
+                grid->description().files.empty() ? "the grid" : grid->description().files.front(), blocks,
+                refinement.ofBlocks().size());
+  return refined(std::move(grid), refinement, blank_value);
+}
+
+Refinement refinementByNeed(const DataSource& source, unsigned threads) {
+  const ConversionThreads bound(threadsFor(threads));
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  return grid ? refinementByNeed(*grid) : Refinement();
+}
+
+std::string noteOnCells(const DataSource& source, unsigned threads) {
+  const ConversionThreads bound(threadsFor(threads));
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  return grid ? noteOnCells(*grid) : std::string();
+}
+
+std::optional<uint32_t> parseRefinement(const std::string& option, const std::string& text) {
+  if (text == kByNeed) return {};
+  uint32_t parts = 0;
+  const char* const end = text.data() + text.size();
+  const auto [parsed, error] = std::from_chars(text.data(), end, parts);
+  if (error != std::errc{} || parsed != end || parts < 1 || parts > kMaxRefinement)
+    throw UsageError("{} {}: expected 1 to {}, or auto", option, text, kMaxRefinement);
+  return parts;
 }
 
 std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
@@ -347,14 +410,35 @@ std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std:
   return chosen;
 }
 
+std::optional<Refinement> refinementOfSteps(const ConvertArguments& arguments,
+                                            const std::filesystem::path& cache,
+                                            const std::vector<StepFiles>& steps) {
+  if (const auto of_cache = refinementOf(arguments, cache)) return of_cache;
+  if (!arguments.refine) return {};
+  if (const auto parts = parseRefinement("--refine", *arguments.refine)) return Refinement(*parts);
+  std::exception_ptr failure;
+  for (const StepFiles& step : steps) try {
+      ConvertArguments of_step = arguments;
+      of_step.grid = step.options;
+      return openSource(of_step, cache)->description().refinement;
+    } catch (const Error&) {  // with --keep-going, the step is left out
+      if (!failure) failure = std::current_exception();
+    }
+  if (failure) std::rethrow_exception(failure);
+  return {};
+}
+
 SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
   SeriesInput input;
+  const auto first = std::make_shared<RefinementOnce>();
   input.count = steps.size();
   input.name = [&](uint64_t step) { return steps[step].name; };
-  input.open = [&](uint64_t step) {
+  input.open = [&, first](uint64_t step) {
+    const std::filesystem::path& cache = arguments.adds_steps ? arguments.to : arguments.output;
     ConvertArguments of_step = arguments;
+    of_step.refinement = first->get([&] { return refinementOfSteps(arguments, cache, steps); });
     of_step.grid = steps[step].options;
-    return openSource(of_step, arguments.adds_steps ? arguments.to : arguments.output);
+    return openSource(of_step, cache);
   };
   input.scalars = [&](const GridDescription& description) {
     return chooseScalars(arguments, arguments.scalars, description);

@@ -22,7 +22,9 @@
 #include "preprocess/formats/derived/derived_source.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_files.h"
+#include "preprocess/grid/grid_source.h"
 #include "stream/base/progress.h"
+#include "stream/model/refinement.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/results.h"
 
@@ -45,6 +47,10 @@ std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const D
 /// Limit of --refine: a cell becomes 4096 cells.
 inline constexpr uint32_t kMaxRefinement = 16;
 
+/// Parses a number of parts or "auto", which is nullopt: cells are cut where their shapes need it. `option`: the
+/// name in messages. Throws UsageError.
+std::optional<uint32_t> parseRefinement(const std::string& option, const std::string& text);
+
 /// Command-line arguments as given; checked and parsed later.
 struct ConvertArguments {
   OpenGridOptions grid;
@@ -52,7 +58,8 @@ struct ConvertArguments {
   std::vector<std::string> scalars, added_scalars;
   std::filesystem::path output, to, temporary_folder, statistics, trace;
   std::optional<double> blank_value;
-  std::optional<uint32_t> refine;  // parts of a cell along each axis
+  std::optional<std::string> refine;     // parts of a cell along each axis, or auto
+  std::optional<Refinement> refinement;  // instead: as a cache has it
   std::optional<std::string> memory;
   unsigned threads = 0;
   bool overwrite = false, resume = false, no_preflight = false, dry_run = false;
@@ -72,10 +79,16 @@ struct ConvertArguments {
 /// files go to --tmp, or without it beside `cache`.
 std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
 
-/// The source with each cell cut into parts x parts x parts. Throws Error for an unstructured grid, unless
-/// `parts` is 1.
-std::unique_ptr<DataSource> refinedBy(uint32_t parts, std::unique_ptr<DataSource> source,
+/// The source with cells cut as a cache has it. Throws Error if these are cells of an unstructured grid, or of
+/// other blocks.
+std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_ptr<DataSource> source,
                                       std::optional<double> blank_value);
+
+/// The refinement by need of a grid (preprocess/survey/cell_bends.h); none of an unstructured one. `threads`: at
+/// most, or 0.
+Refinement refinementByNeed(const DataSource& source, unsigned threads);
+/// The note on a grid whose cells a picture will show; empty for others and for unstructured ones.
+std::string noteOnCells(const DataSource& source, unsigned threads);
 
 /// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names it
 /// chooses all that the files store, at most 16 of one centring, and a note says what is left out. Prints a
@@ -134,6 +147,12 @@ nlohmann::json commonStatistics(const Report& report, const Progress& progress) 
 /// The time steps of the files that --steps and --every select. `option`: the name of --steps in messages.
 /// Throws UsageError, and Error if the files cannot be read.
 std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std::string& option = "--steps");
+
+/// The refinement of all `steps` of a series: that of `cache` if it is continued, or as --refine asks, by need of
+/// the first step that can be opened. nullopt without the option. Throws UsageError and Error.
+std::optional<Refinement> refinementOfSteps(const ConvertArguments& arguments,
+                                            const std::filesystem::path& cache,
+                                            const std::vector<StepFiles>& steps);
 
 /// A series for convertSeries(): opens each step as `arguments` say, and chooses the scalars from the first.
 /// `arguments` and `steps` must outlive the result.

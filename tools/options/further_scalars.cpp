@@ -91,7 +91,7 @@ void addScalarToSeries(const fs::path& cache, const std::vector<fs::path>& files
   for (const VariableInfo& variable : before.seriesManifest().variables)
     arguments.scalars.push_back(variable.name);
   arguments.scalars.push_back(name);
-  arguments.refine = before.seriesManifest().refined;
+  arguments.refinement = before.seriesManifest().refinement;
 
   const std::string folder_name = whole.filename().string() + ".adding";
   PreviewFolder::removeLeftOnes(whole.parent_path(), folder_name);

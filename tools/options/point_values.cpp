@@ -107,7 +107,7 @@ OpenSource openSource(const CacheReader& reader, const PointSource& source) {
     options.scalars.push_back(variable.name);
     opened.ranges.push_back({variable.min, variable.max});
   }
-  opened.grid = refinedBy(reader.manifest().refined, openWithDerived(options, {source.gas, std::nullopt}),
+  opened.grid = refinedBy(reader.manifest().refinement, openWithDerived(options, {source.gas, std::nullopt}),
                           std::nullopt);
   const GridDescription& description = opened.grid->description();
   opened.scalars = scalarsLike(reader, description, source.grid);

@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/addition/convert_series.h"
@@ -24,6 +25,7 @@
 #include "stream/base/error.h"
 #include "stream/base/memory.h"
 #include "stream/cache/series.h"
+#include "stream/model/refinement.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/start_checks.h"
@@ -167,13 +169,23 @@ py::tuple points(OpenCache& cache, const DataChoice& choice, const py::object& p
   return pointArrays(withScalar(cache, choice.scalar).reader(), choice, progress);
 }
 
-/// 1 where it is not given.
-uint32_t refinementOf(const py::dict& given_options) {
-  if (!given_options.contains("refine")) return 1;
-  const auto parts = py::cast<uint64_t>(given_options["refine"]);
-  if (parts < 1 || parts > kMaxRefinement)
-    throw UsageError("refine: {} parts of a cell; expected 1 to {}", parts, kMaxRefinement);
-  return static_cast<uint32_t>(parts);
+/// A number of parts or "auto"; 1 where it is not given. Throws UsageError.
+std::string refinementOf(const py::dict& given_options) {
+  if (!given_options.contains("refine")) return "1";
+  const auto text = py::cast<std::string>(given_options["refine"]);
+  parseRefinement("refine", text);
+  return text;
+}
+
+/// The source with cells cut as "refine" asks. Reads it without the interpreter's lock, which a source of Python's needs; but it is
+/// deleted with it.
+std::unique_ptr<DataSource> refinedAs(const py::dict& given_options, std::unique_ptr<DataSource> source,
+                                      std::optional<double> blank_value, const py::object& progress) {
+  const auto threads = py::cast<unsigned>(given_options["threads"]);
+  const auto parts = parseRefinement("refine", refinementOf(given_options));
+  Refinement refinement(parts.value_or(1));
+  if (!parts) runInterruptibly(progress, [&](Progress&) { refinement = refinementByNeed(*source, threads); });
+  return refinedBy(refinement, std::move(source), blank_value);
 }
 
 /// The options of a conversion that both kinds of input have.
@@ -246,8 +258,9 @@ py::dict convertArrays(const std::filesystem::path& output, const py::list& bloc
                        const py::dict& given_options, const py::object& progress) {
   ConvertOptions options = convertOptions(output, given_options);
   options.scalars = allScalars(names);
+  beginThreads(options.threads);
   const auto source =
-      refinedBy(refinementOf(given_options), sourceOf(blocks, names, given_options), options.blank_value);
+      refinedAs(given_options, sourceOf(blocks, names, given_options), options.blank_value, progress);
   options.time = py::cast<std::optional<double>>(given_options["time"]);
   return convertSource(*source, std::move(options), progress);
 }
@@ -260,8 +273,8 @@ uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks
   options.add = true;
   // Opened at once: its errors name the array.
   std::unique_ptr<DataSource> source = sourceOf(blocks, names, given_options);
-  source =
-      refinedBy(readManifest(options.convert.output).refined, std::move(source), options.convert.blank_value);
+  source = refinedBy(readManifest(options.convert.output).refinement, std::move(source),
+                     options.convert.blank_value);
   SeriesInput input;
   input.count = 1;
   input.name = [](uint64_t) { return std::string("arrays in memory"); };
@@ -281,8 +294,9 @@ py::dict convertCallable(const std::filesystem::path& output,
   ConvertOptions options = convertOptions(output, given_options);
   options.scalars = allScalars(names);
   const bool parts = py::cast<bool>(given_options["parts_of_rows"]);
-  const auto source = refinedBy(refinementOf(given_options), sourceOfCallable(shapes, names, {read, parts}),
-                                options.blank_value);
+  beginThreads(options.threads);
+  const auto source =
+      refinedAs(given_options, sourceOfCallable(shapes, names, {read, parts}), options.blank_value, progress);
   return convertSource(*source, std::move(options), progress);
 }
 

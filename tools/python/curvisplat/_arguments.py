@@ -36,6 +36,11 @@ def whole(name: str, value: Any, least: int = 0) -> int:
     return number
 
 
+def refinement(value: Any) -> str:
+    """Parts of a cell along each axis, or "auto"."""
+    return value if isinstance(value, str) else str(whole("refine", value))
+
+
 def flag(name: str, value: Any) -> bool:
     """True or False."""
     if not isinstance(value, bool):

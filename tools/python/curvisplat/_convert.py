@@ -41,7 +41,7 @@ def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory
 @_arguments.in_one_line
 def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, scalars: Union[str, Sequence[str]] = (),
             time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False, vertical_scale: float = 1,
-            select: Optional[Mapping[str, float]] = None, blank_value: Optional[float] = None, refine: int = 1, overwrite: bool = False, resume: bool = False,
+            select: Optional[Mapping[str, float]] = None, blank_value: Optional[float] = None, refine: Union[int, str] = 1, overwrite: bool = False, resume: bool = False,
             memory: Union[str, int, None] = None, threads: int = 0, title: str = "", value_precision: str = "auto",
             progress: Optional[Progress] = None) -> Report:
     """Converts grid files of any kind that `curvisplat convert` reads to the cache `output`, with the same bytes.
@@ -53,7 +53,7 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
     scalars: names (default: all that the files store). vertical_scale: the exaggeration of heights on the globe.
     select: which value to read of dimensions of NetCDF that are neither space nor time, such as {"month": 3}.
     blank_value: samples with this value are not drawn. refine: cut each cell into so many parts along each axis, by its own
-    trilinear map (1 to 16). resume: go on from an interrupted conversion. memory: the limit of this process, in bytes or as
+    trilinear map (1 to 16), or "auto": only where cells differ much from those beside them. resume: go on from an interrupted conversion. memory: the limit of this process, in bytes or as
     "2G". value_precision: "auto" (as fine as the spread of values needs), "normal" (16 bits for the range of a brick) or "fine" (24). progress: called with (phase, done,
     total, unit).
 
@@ -62,7 +62,7 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
     """
     options = _options(overwrite, resume, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
-    options["refine"] = _arguments.whole("refine", refine)
+    options["refine"] = _arguments.refinement(refine)
     return _convert_files(output, grid, solutions, scalars, options, time_step=time_step, steps=steps, keep_going=keep_going,
                           vertical_scale=vertical_scale, select=select, progress=progress)
 
@@ -117,7 +117,7 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
 
 
 @_arguments.in_one_line
-def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, refine: int = 1,
+def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, refine: Union[int, str] = 1,
                    overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
                    time: Optional[float] = None, value_precision: str = "auto", progress: Optional[Progress] = None) -> Report:
     """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
@@ -128,7 +128,7 @@ def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = 
     tuples, units = _tuples(blocks)
     options = _options(overwrite, False, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
-    options["refine"] = _arguments.whole("refine", refine)
+    options["refine"] = _arguments.refinement(refine)
     options["time"] = None if time is None else float(time)
     return Report(**_core.convert_arrays(_arguments.path(output), tuples, units, options, progress))
 
@@ -156,7 +156,7 @@ def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
 
 @_arguments.in_one_line
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
-                     scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None, refine: int = 1,
+                     scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None, refine: Union[int, str] = 1,
                      overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
                      value_precision: str = "auto", progress: Optional[Progress] = None) -> Report:
     """Converts a grid larger than memory that `read` hands out piece by piece.
@@ -171,7 +171,7 @@ def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read:
     units = [(_arguments.text("scalars", name), _arguments.text("units", unit)) for name, unit in units]
     options = _options(overwrite, False, blank_value, memory, threads, title)
     options["value_precision"] = value_precision
-    options["refine"] = _arguments.whole("refine", refine)
+    options["refine"] = _arguments.refinement(refine)
     options["parts_of_rows"] = _takes_parts_of_rows(read)
     return Report(**_core.convert_callable(_arguments.path(output), [_arguments.shape(shape) for shape in shapes], units, read,
                                            options, progress))
