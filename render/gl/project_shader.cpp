@@ -220,20 +220,32 @@ mat3 factorOf(vec3 axis, vec3 shear) {
   return mat3(axis.x * vec3(1.0, shear.x, shear.y), axis.y * vec3(0.0, 1.0, shear.z), vec3(0.0, 0.0, axis.z));
 }
 
-// Writes a splat that can be seen, with its keys; `is_cut`: its record lies before it. As SplatChooser::chooseWith(). Returns
-// which of `fates` counts it.
-uint choose(uint slot, uint p, Place at, Ellipse e, float mean, uint skew, vec2 slope, vec2 lit_by, bool is_cut) {
+// A splat, or a piece of one.
+struct Projected {
+  Ellipse e;
+  float mean;
+  uint skew;
+  vec2 slope;  // of the plane that it lies in
+  vec2 lit_by;
+  bool is_cut;  // its record lies before it
+};
+
+// Writes a splat that can be seen, with its keys, as SplatChooser::chooseWith(). Returns which of `fates` counts it.
+uint choose(uint slot, uint p, Place at, Projected splat) {
+  Ellipse e = splat.e;
+  float mean = splat.mean;
+  vec2 slope = splat.slope;
   vec2 reach_px = SUPPORT * vec2(e.l11, abs(e.l21) + e.l22);
   if (!(all(greaterThan(at.pixel + reach_px, vec2(0.0))) && all(lessThan(at.pixel - reach_px, picture)))) return 0u;
   if (!per_pixel) e.slope0 = e.slope1 = e.half_width = e.along = 0.0;
-  float spread = SUPPORT * (abs(e.slope0) + abs(e.slope1)) + (is_cut ? CUT_REACH / 1.7320508 : 1.0) * e.half_width;
+  float spread = SUPPORT * (abs(e.slope0) + abs(e.slope1)) + (splat.is_cut ? CUT_REACH / 1.7320508 : 1.0) * e.half_width;
   if (!(abs(mean) + spread <= largest_scalar)) {
     e.slope0 = e.slope1 = e.half_width = e.along = spread = 0.0;
     mean = clamp(mean, -largest_scalar, largest_scalar);
   }
   e.amplitude = min(e.amplitude, 1e30);
   if (!(e.amplitude > 0.0) || isTransparent(mean - spread, mean + spread)) return 1u;
-  if (lit) e.half_width = withLight(e.half_width, lit_by);
+  if (lit) e.half_width = withLight(e.half_width, splat.lit_by);
 #if PERSPECTIVE
   slope *= key_steps_a_pixel * (uintBitsToFloat(parts[p].w) - at.depth);
 #else
@@ -244,8 +256,8 @@ uint choose(uint slot, uint p, Place at, Ellipse e, float mean, uint skew, vec2 
   uint first = clamp(firstKey(at.pixel, e, key, slope), keys.x, keys.y);
   key = clamp(key, keys.x, keys.y);
   splats[slot] = floatBitsToUint(vec4(at.pixel, e.l11, e.l21));
-  splats[slot + 1u] = floatBitsToUint(vec4(e.l22, is_cut ? -e.amplitude : e.amplitude, mean, e.slope0));
-  splats[slot + 2u] = uvec4(floatBitsToUint(vec2(e.slope1, e.half_width)), skew, floatBitsToUint(e.along));
+  splats[slot + 1u] = floatBitsToUint(vec4(e.l22, splat.is_cut ? -e.amplitude : e.amplitude, mean, e.slope0));
+  splats[slot + 2u] = uvec4(floatBitsToUint(vec2(e.slope1, e.half_width)), splat.skew, floatBitsToUint(e.along));
   splats[slot + 3u] = uvec4(key, first, floatBitsToUint(slope));
   return 2u;
 }
@@ -279,7 +291,7 @@ uint project(uvec4 group, uint thread) {
   Ellipse e = ellipseOf(b0, b1, w, OF(16), OF(9) * place.volume);
   uint skew = skewOf(words[at + 11u * n], vec2(b0.x, b1.x), vec2(b0.y, b1.y), vec2(b0.z, b1.z), e);
   vec2 slope = planeOf(b0, b1, rowOf(place.to_depth, a));
-  return choose(slot, p, place, e, OF(12), skew, slope, litAt(p, position, w, axis, shear), false);
+  return choose(slot, p, place, Projected(e, OF(12), skew, slope, litAt(p, position, w, axis, shear), false));
 }
 
 vec4 fourAt(uint word) {
@@ -372,7 +384,7 @@ uint projectPieces(uvec4 group, uint thread) {
       e.half_width = cell.half_width;
       e.along = cell.along * shareAtCentre(cut);
     }
-    uint fate = choose(slot + 4u, p, place, e, piece_mean, packSkew(t), slope, lit_by, cut.count > 0);
+    uint fate = choose(slot + 4u, p, place, Projected(e, piece_mean, packSkew(t), slope, lit_by, cut.count > 0));
     if (fate == 2u && cut.count > 0) {  // as ScreenCut::record()
       float tag = -(FAR_SIDES_TAG * float(cut.far_sides) + CUT_TAG);
       splats[slot] = floatBitsToUint(vec4(cut.faces[0].xy, tag, cut.faces[0].z));

@@ -37,7 +37,7 @@ struct GmshSamples {
   std::function<std::span<const uint64_t>(uint64_t element)> nodesOf;  // by their indices
 };
 
-/// Spools the values of all nodes, or of all elements, in their order: NaN where the sections have none. Of a node the mean of
+/// Spools the values of all nodes, or of all elements, in their order: NaN where the sections have none. A node has the mean of
 /// what its elements have there. Throws Error.
 SpooledNumbers spooledGmshData(GmshReader& reader, const std::vector<const GmshData*>& sections,
                                const GmshSamples& samples);
