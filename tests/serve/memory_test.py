@@ -79,7 +79,9 @@ class ServerMemory(unittest.TestCase):
             viewer = Viewer(server)
             shown = viewer.open()["state"]
             low, high = viewer.facts["scalars"][0]["low"], viewer.facts["scalars"][0]["high"]
-            shown |= {"isovalues": [low + (high - low) * (n + 0.5) / 32 for n in range(32)], "lod_pixels": 0}
+            values = [low + (high - low) * (n + 0.5) / 32 for n in range(32)]
+            shown |= {"isosurfaces": [{"scalar": shown["variable"], "value": value, "visible": True} for value in values],
+                      "lod_pixels": 0}
             shown["camera"]["parallel_scale"] *= 10
             viewer.view(shown)
             self.assertEqual(viewer.picture(), "--viewer-memory 64 MiB: too little for 64x48 pixels of this cache")
