@@ -295,9 +295,9 @@ TEST_F(RefineCommand, CutsByNeed) {
   EXPECT_EQ(by_need.err.find("cells differ"), std::string::npos);
   const nlohmann::json cut = manifest("auto.splats");
   EXPECT_FALSE(cut.contains("refined"));
-  EXPECT_EQ(cut["blocks"][0]["refined"], (nlohmann::json{1, 4, 1}));
-  EXPECT_EQ(cut["nodes"], 9 * 13 * 5);
-  expectSays(runProgram({"info", file("auto.splats")}).out, "1 x 4 x 1");
+  EXPECT_EQ(cut["blocks"][0]["refined"], (nlohmann::json{1, 2, 1}));
+  EXPECT_EQ(cut["nodes"], 9 * 7 * 5);
+  expectSays(runProgram({"info", file("auto.splats")}).out, "1 x 2 x 1");
   const Files one = filesOf(folder_ / "auto.splats");
   convert_ring("auto.splats", {"--refine", "auto", "--threads", "2", "--memory", "200M", "--overwrite"});
   EXPECT_TRUE(filesOf(folder_ / "auto.splats") == one);
@@ -326,7 +326,7 @@ TEST_F(RefineCommand, AllStepsAreCutByTheNeedOfTheFirst) {
     return Words{"convert", file("ring.xyz"), file("r_*.fun"), "-o", file(cache), "--refine", "auto"} + more;
   };
   run(series("all.splats", {}));
-  EXPECT_EQ(manifest("all.splats")["blocks"][0]["refined"], (nlohmann::json{1, 4, 1}));
+  EXPECT_EQ(manifest("all.splats")["blocks"][0]["refined"], (nlohmann::json{1, 2, 1}));
   run(series("some.splats", {"--steps", "0:1"}));
   run(series("some.splats", {"--resume"}));
   EXPECT_TRUE(filesOf(folder_ / "some.splats") == filesOf(folder_ / "all.splats"));
