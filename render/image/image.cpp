@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "stream/base/error.h"
-#include "stream/base/memory.h"
 
 namespace curvisplat {
 namespace {
@@ -19,11 +18,7 @@ double overWhite(const float* pixel, int channel) {
 
 }  // namespace
 
-Image::Image(ImageSize size_) : size(size_) {
-  rgba.reserve(4 * size.pixels());
-  preferHugePages(rgba.data(), 4 * size.pixels() * sizeof(float));
-  rgba.resize(4 * size.pixels());
-}
+Image::Image(ImageSize size_) : size(size_), rgba(4 * size_.pixels()) {}
 
 ImageDifference compareImages(const Image& a, const Image& b) {
   if (a.size != b.size)
