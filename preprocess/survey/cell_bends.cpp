@@ -332,9 +332,8 @@ std::string noteOnCells(const GridSource& source) {
   }
   if (count == 0 || shown < kMinShare * volume) return {};
   return fmt::format(
-      "cells{} differ much from those beside them: a picture will show bands of about {:.0f} % of the "
-      "optical "
-      "depth; {}",
+      "cells{} differ much from those beside them: a picture will show bands of about "
+      "{:.0f} % of the optical depth; {}",
       count < blocks.size() ? fmt::format(" of {} of {} blocks", count, blocks.size()) : "",
       std::sqrt(square / shown),
       source.description().refinement.cutsCells() ? "--refine N with a larger N makes them smaller"

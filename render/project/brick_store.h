@@ -79,7 +79,7 @@ class BrickStore {
   virtual uint64_t defaultBytes() const = 0;
   virtual bool has(uint32_t brick) const = 0;
   /// Adds a brick. Bricks that no part of the last makeRoom() needs may be evicted for it. If there is no free
-  /// range for it all the same, has() remains false, and the next makeRoom() empties the store.
+  /// range for it all the same, the brick is not stored, which has() tells; the next makeRoom() empties the store.
   virtual void put(uint32_t brick, const GeometryArrays<const float>& geometry,
                    const VariableArrays<const float>& values, const BrickPieces& pieces) = 0;
   /// Whether pictures with these settings can be drawn from a store. Those with layers or gradient opacity

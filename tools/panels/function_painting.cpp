@@ -91,7 +91,7 @@ void paintNumbers(const EditedFunction& function) {
   const float width = availableWidth();
   constexpr int kNumbers = 4;
   const auto scalar = [&](int n) { return function.scalarAt(static_cast<double>(n) / kNumbers); };
-  // As many digits as tell neighbours apart: 0.999, 1.001 and not 0.999, 1.
+  // The numbers have as many digits as tell neighbours apart: 0.999, 1.001 and not 0.999, 1.
   double closest = std::abs(scalar(1) - scalar(0)), largest = 0;
   for (int n = 0; n <= kNumbers; ++n) {
     largest = std::max(largest, std::abs(scalar(n)));

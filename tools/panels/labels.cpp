@@ -88,7 +88,7 @@ bool unfoldsFor(const std::string& text, const std::optional<size_t>& seen, size
 
 Section::Section(const char* text, std::optional<size_t>& seen, size_t number) {
   constexpr float kSeenLines = 8;  // of the list below its header
-  // The same widget for any number.
+  // The number does not change which widget it is.
   const std::string shown = number == 0 ? text : fmt::format("{} ({})", text, number);
   const std::string label = fmt::format("{}###{}", shown, text);
   const bool unfolds = unfoldsFor(label, seen, number);

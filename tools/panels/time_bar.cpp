@@ -106,7 +106,7 @@ void drawTimeBar(const CacheReader& cache, const Playback& playback, const Recta
   const std::string when = date.empty() ? fmt::format("t = {:.6g}{}{}", time,
                                                       series.time_unit.empty() ? "" : " ", series.time_unit)
                                         : date;
-  // As wide as the longest, so that nothing moves while it plays.
+  // The field is as wide as the longest text, so that nothing moves while it plays.
   const float unit = ImGui::GetFontSize();
   const float of_step = ImGui::CalcTextSize(fmt::format("{0}.00 of {0}", playback.steps()).c_str()).x;
   const float of_time = std::max(11 * unit, ImGui::CalcTextSize(when.c_str()).x);
