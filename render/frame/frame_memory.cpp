@@ -16,17 +16,19 @@
 #include "stream/base/threads.h"
 #include "stream/model/octree.h"
 #include "stream/model/splats.h"
+#include "stream/paging/layer_merger.h"
 
 namespace curvisplat {
 namespace {
 
 // A worker's memory: what reading keeps on its thread (a brick's bytes and the decoder's scratch memory), a
-// decoded brick (16 numbers per splat), the projector's splats and depths, keys, two sorters, the stack.
+// decoded brick (16 numbers per splat), what merges its layers, the projector's splats and depths, keys, two sorters, the stack.
 constexpr uint64_t kReadingBytes = 12 << 20;
 constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16 * sizeof(float) +
                                   BrickProjector::kMaxSplats * (sizeof(ScreenSplat) + sizeof(float)) +
                                   BrickProjector::kMaxSplats * (4 + 2 * sizeof(DepthItem)) +
-                                  SweepBuffer::kMaxBatch * 2 * sizeof(DepthItem) + (1 << 20);
+                                  LayerMerger::kBytes + SweepBuffer::kMaxBatch * 2 * sizeof(DepthItem) +
+                                  (1 << 20);
 // The memory that pictures of two scalars take in addition: the second one's values, and a record for each
 // splat.
 constexpr uint64_t kSecondScalarBytes =

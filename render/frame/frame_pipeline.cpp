@@ -198,10 +198,12 @@ bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, 
   std::vector<BrickPart> parts;
   if (exchange_) {
     for (const uint32_t number : exchange_->toPrepare()) parts.push_back(exchange_->parts()[number].part);
-    pools_->source.start(parts, [this](uint32_t brick) { return exchange_->isUnneeded(brick); });
+    pools_->source.start(
+        parts, [this](uint32_t brick) { return exchange_->isUnneeded(brick); }, plan.mergings);
   } else {
     for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
-    pools_->source.start(parts, [&](uint32_t brick) { return isLeftOut(brick, plan, options); });
+    pools_->source.start(
+        parts, [&](uint32_t brick) { return isLeftOut(brick, plan, options); }, plan.mergings);
   }
   pools_->workers.start(region ? region->tiles.get() : nullptr);
   return true;
@@ -423,7 +425,7 @@ void FramePipeline::prefetch(const FramePlan& plan, const FrameOptions& options)
   makePools(options);
   std::vector<BrickPart> parts;
   for (const SweptPart& part : plan.parts) parts.push_back(part.part);
-  pools_->source.startPrefetch(parts);
+  pools_->source.startPrefetch(parts, plan.mergings);
   pools_->workers.startPrefetch();
 }
 

@@ -62,6 +62,13 @@ CutOptions limitsOf(const FrameOptions& options) {
   return limits;
 }
 
+/// The pixels that a stretched unit takes at the nearest point of a brick; infinite around the eye.
+double largestPixels(const Brick& brick, const CutView& view) {
+  if (!view.perspective) return view.pixels;
+  const glm::dvec3 nearest = glm::clamp(view.eye, view.scale * brick.lower, view.scale * brick.upper);
+  return view.pixels / glm::length(view.eye - nearest);
+}
+
 std::vector<ValueBounds> subtreesOf(const CacheReader& cache, size_t variable) {
   return subtreeBounds(cache.bricks(), cache.brickVariables(variable));
 }
@@ -102,6 +109,7 @@ void FramePlanner::stepChanged() {
   colour_classes_ = colourClassesFor(cache_, coloured_by_);
   change_ = ClassificationChange(table_);
   if (colour_classes_) colour_change_.emplace(*colour_classes_);
+  forgetMergings();
   subtrees_ = subtreesOf(cache_, variable_);
   if (coloured_by_) colour_subtrees_ = subtreesOf(cache_, coloured_by_->variable);
 }
@@ -112,6 +120,12 @@ void FramePlanner::setTransferFunction(const TransferFunction& transfer_function
   change_ = ClassificationChange(table_);
   if (!coloured_by_) colours_ = ColourTable(transfer_function);
   scalar_range_ = transfer_function.range();
+  forgetMergings();
+}
+
+void FramePlanner::forgetMergings() {
+  const MutexLock lock(mutex_);
+  mergings_ = LayerMergings();
 }
 
 ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
@@ -253,10 +267,29 @@ FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut) cons
   return plan;
 }
 
+/// Has layers merged that are too thin to be seen in a picture of these settings. Not where light, the gradient's opacity or one
+/// colour a splat show the splats themselves.
+void FramePlanner::mergeLayers(const ProjectionSettings& settings, double lod_pixels, FramePlan& plan) const {
+  if (!(lod_pixels > 0) || settings.lit() || settings.gradient || !settings.per_pixel) return;
+  const CutView view = settings.view.cutView();
+  const MutexLock lock(mutex_);
+  const LayerMergings::Functions functions{table_, colourClasses(), view.scale};
+  for (SweptPart& part : plan.parts) {
+    const Brick& brick = cache_.bricks()[part.part.brick];
+    if (!brick.isLeaf()) continue;
+    const auto merging = mergings_.of(lod_pixels / largestPixels(brick, view), functions);
+    if (!merging) continue;
+    const auto known = std::find(plan.mergings.begin(), plan.mergings.end(), merging);
+    part.part.merging = static_cast<uint16_t>(known - plan.mergings.begin() + 1);
+    if (known == plan.mergings.end()) plan.mergings.push_back(merging);
+  }
+}
+
 FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
   const CutOptions limits = limitsOf(options);
   FramePlan plan = planOf(settings, chooseCut(settings, options, limits));
+  mergeLayers(settings, options.lod_pixels, plan);
   plan.slices = planSlices(settings, options, limits);
   planIsosurfaces(options, limits, plan);
   return plan;
@@ -311,6 +344,8 @@ QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& opti
                          std::max(quick_limits.detail_px, cut.complete ? 0 : cut.largest_error_px));
   ProjectionSettings reduced = size.isWhole() ? settings : settingsFor(camera, options, size.size());
   FramePlan plan = planOf(reduced, std::move(cut));
+  mergeLayers(settings, options.lod_pixels,
+              plan);  // of the whole picture's pixels: it will find them in memory
   plan.slices = planSlices(plan.settings, options, limits);
   planIsosurfaces(options, limits, plan);
   return {std::move(plan), size};

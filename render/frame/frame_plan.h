@@ -19,6 +19,7 @@
 #include "render/colour/classification.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
+#include "render/frame/layer_mergings.h"
 #include "render/project/depth_sort.h"
 #include "render/project/gradient_opacity.h"
 #include "render/project/projection.h"
@@ -28,6 +29,7 @@
 #include "stream/base/mutex.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/model/octree.h"
+#include "stream/paging/brick_source.h"
 #include "stream/paging/cut.h"
 
 namespace curvisplat {
@@ -57,6 +59,7 @@ struct FramePlan {
   std::shared_ptr<const TileSet> tiles = nullptr;       // of this rank; null: all
   std::shared_ptr<const SharedParts> shared = nullptr;  // with other ranks; null: alone
   uint64_t parts_elsewhere = 0;                         // of the cut, in others' tiles: not in `parts`
+  BrickSource::Mergings mergings = {};                  // of the parts: BrickPart::merging
 };
 
 /// A part of the cut with its rank and its range of depth keys, as the sweep needs it.
@@ -117,6 +120,7 @@ class FramePlanner {
   std::function<double(uint32_t)> errorWeightIn(const ProjectionSettings& settings, const CutView& view,
                                                 double lod_pixels) const;
   void planIsosurfaces(const FrameOptions& options, const CutOptions& limits, FramePlan& plan) const;
+  void forgetMergings();
   std::shared_ptr<const GradientOpacity> gradientOf(const FrameOptions& options) const;
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
   CutView cutViewOf(const ProjectionSettings& settings) const;
@@ -125,6 +129,7 @@ class FramePlanner {
   std::vector<SlicePlan> planSlices(const ProjectionSettings& settings, const FrameOptions& options,
                                     const CutOptions& limits) const;
   FramePlan planOf(const ProjectionSettings& settings, Cut cut) const;
+  void mergeLayers(const ProjectionSettings& settings, double lod_pixels, FramePlan& plan) const;
 
   const CacheReader& cache_;
   const size_t variable_;
@@ -146,6 +151,7 @@ class FramePlanner {
   };
   mutable Mutex mutex_;
   mutable Gradients gradients_ GUARDED_BY(mutex_);
+  mutable LayerMergings mergings_ GUARDED_BY(mutex_);
 };
 
 /// The least weight, for this error allowed on the screen. The detail of bricks that count least is at most

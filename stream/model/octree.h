@@ -122,6 +122,8 @@ inline constexpr uint8_t kAllOctants = 0xff;
 struct BrickPart {
   uint32_t brick = 0;
   uint8_t octants = kAllOctants;
+  uint16_t merging =
+      0;  // how layers of thin cells are merged: its place in the list of the frame, from 1. 0: not
   bool operator==(const BrickPart&) const = default;
 
   bool whole() const { return octants == kAllOctants; }

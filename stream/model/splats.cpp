@@ -40,6 +40,22 @@ VariableArrays<const float> arraysOf(const SplatVariable& v) {
   return {v.mean.data(), v.slope0.data(), v.slope1.data(), v.slope2.data(), v.variance.data(), v.size()};
 }
 
+void copyGeometry(const GeometryArrays<const float>& from, const GeometryArrays<float>& to) {
+  const std::array floats{std::pair(from.x, to.x),
+                          std::pair(from.y, to.y),
+                          std::pair(from.z, to.z),
+                          std::pair(from.axis0, to.axis0),
+                          std::pair(from.axis1, to.axis1),
+                          std::pair(from.axis2, to.axis2),
+                          std::pair(from.shear10, to.shear10),
+                          std::pair(from.shear20, to.shear20),
+                          std::pair(from.shear21, to.shear21),
+                          std::pair(from.weight, to.weight)};
+  for (const auto& array : floats) std::copy_n(array.first, from.count, array.second);
+  std::copy_n(from.border_code, from.count, to.border_code);
+  std::copy_n(from.growth_code, from.count, to.growth_code);
+}
+
 void copyValues(const VariableArrays<const float>& from, const VariableArrays<float>& to) {
   std::copy_n(from.mean, from.count, to.mean);
   std::copy_n(from.slope0, from.count, to.slope0);

@@ -147,7 +147,8 @@ GeometryArrays<float> arraysOf(SplatGeometry& geometry);
 VariableArrays<float> arraysOf(SplatVariable& variable);
 GeometryArrays<const float> arraysOf(const SplatGeometry& geometry);
 VariableArrays<const float> arraysOf(const SplatVariable& variable);
-/// Copies all values. Both have the same size.
+/// Copy all arrays. Both have the same size.
+void copyGeometry(const GeometryArrays<const float>& from, const GeometryArrays<float>& to);
 void copyValues(const VariableArrays<const float>& from, const VariableArrays<float>& to);
 
 /// One brick in double precision, in the order in which it will be stored: conversion encodes it, and

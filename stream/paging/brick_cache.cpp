@@ -82,10 +82,10 @@ uint64_t BrickCache::charge(uint64_t splats, bool two_variables) {
   return Arena::charge(arrays * strideOf(splats) * sizeof(float));
 }
 
-void BrickCache::beginEpoch(const std::vector<uint32_t>& bricks) {
+void BrickCache::beginEpoch(const std::vector<BrickKey>& bricks) {
   const MutexLock lock(mutex_);
   ++epoch_;
-  for (const uint32_t brick : bricks) {
+  for (const BrickKey& brick : bricks) {
     const auto found = entries_.find(brick);
     if (found == entries_.end()) continue;
     Entry& entry = found->second;
@@ -94,7 +94,7 @@ void BrickCache::beginEpoch(const std::vector<uint32_t>& bricks) {
   }
 }
 
-std::optional<BrickCache::Pin> BrickCache::find(uint32_t brick) {
+std::optional<BrickCache::Pin> BrickCache::find(BrickKey brick) {
   const MutexLock lock(mutex_);
   const auto found = entries_.find(brick);
   if (found == entries_.end() || !found->second.whole) {
@@ -108,7 +108,7 @@ std::optional<BrickCache::Pin> BrickCache::find(uint32_t brick) {
   return Pin(*this, entry);
 }
 
-std::optional<BrickCache::Slot> BrickCache::makeSlot(uint32_t brick, uint32_t splats) {
+std::optional<BrickCache::Slot> BrickCache::makeSlot(BrickKey brick, uint32_t splats) {
   const uint64_t stride = strideOf(splats), bytes = charge(splats, two_variables_);
   const MutexLock lock(mutex_);
   if (bytes > capacity_ || entries_.contains(brick)) return {};
@@ -120,7 +120,7 @@ std::optional<BrickCache::Slot> BrickCache::makeSlot(uint32_t brick, uint32_t sp
     block = arena_.allocate(bytes);
   }
   Entry& entry = entries_[brick];
-  entry.brick = brick;
+  entry.key = brick;
   entry.bytes = bytes;
   entry.epoch = epoch_;
   entry.block = block;
@@ -149,7 +149,7 @@ BrickCache::Statistics BrickCache::statistics() const {
   return statistics_;
 }
 
-bool BrickCache::contains(uint32_t brick) const {
+bool BrickCache::contains(BrickKey brick) const {
   const MutexLock lock(mutex_);
   return entries_.contains(brick);
 }
@@ -158,9 +158,13 @@ void BrickCache::stepChanged() {
   const MutexLock lock(mutex_);
   CURVISPLAT_CHECK_OP(entries_.size(), ==, unpinned_.size());
   ++step_;
+  for (auto next = unpinned_.begin(); next != unpinned_.end();) {
+    Entry& entry = **next++;
+    if (entry.key.merging != 0) remove(entry);
+  }
 }
 
-bool BrickCache::isStale(uint32_t brick) const {
+bool BrickCache::isStale(BrickKey brick) const {
   const MutexLock lock(mutex_);
   const auto found = entries_.find(brick);
   return found != entries_.end() && found->second.whole && found->second.step != step_;
@@ -176,7 +180,7 @@ void BrickCache::remove(Entry& entry) {
   arena_.free(entry.block, entry.bytes);
   --statistics_.bricks;
   statistics_.bytes -= entry.bytes;
-  entries_.erase(entry.brick);
+  entries_.erase(BrickKey(entry.key));  // a copy: the entry goes
 }
 
 BrickCache::Pin::Pin(Pin&& other) noexcept

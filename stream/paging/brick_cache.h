@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <list>
 #include <map>
 #include <memory>
@@ -57,6 +58,14 @@ class Arena {
   const uint64_t capacity_;
   std::unique_ptr<std::byte, Free> memory_;
   std::map<uint64_t, uint64_t> holes_;  // offset -> bytes, no two touch
+};
+
+/// The key of a decoded brick, which is kept as it is stored, or with its layers merged (LayerMerging::number).
+struct BrickKey {
+  uint32_t brick = 0, merging = 0;
+
+  BrickKey(uint32_t brick_, uint32_t merging_ = 0) : brick(brick_), merging(merging_) {}
+  bool operator==(const BrickKey&) const = default;
 };
 
 /// The decoded bricks. Threads find() a brick, or make a Slot for it, decode into that, and keep() it.
@@ -116,20 +125,20 @@ class BrickCache {
   };
 
   /// Begins an epoch that needs `bricks`: those in the cache count as used in it.
-  void beginEpoch(const std::vector<uint32_t>& bricks);
+  void beginEpoch(const std::vector<BrickKey>& bricks);
   /// The brick, pinned and used in this epoch; nullopt if it is not in the cache.
-  std::optional<Pin> find(uint32_t brick);
+  std::optional<Pin> find(BrickKey brick);
   /// Space for a brick that is not in the cache; evicts others if necessary. nullopt if too much is pinned
   /// or used in this epoch, or if the brick is in the cache or has a slot already.
-  std::optional<Slot> makeSlot(uint32_t brick, uint32_t splats);
+  std::optional<Slot> makeSlot(BrickKey brick, uint32_t splats);
 
-  bool contains(uint32_t brick) const;
+  bool contains(BrickKey brick) const;
 
-  /// Declares that the values of the bricks here are of an earlier step; their geometry stays. Nothing
-  /// may be pinned.
+  /// Declares that the values of the bricks here are of an earlier step. Their geometry stays, but merged ones are removed:
+  /// what they were merged from is gone. Nothing may be pinned.
   void stepChanged();
   /// Whether the brick is here with values of an earlier step.
-  bool isStale(uint32_t brick) const;
+  bool isStale(BrickKey brick) const;
 
   struct Statistics {
     uint64_t hits = 0, misses = 0;  // of find()
@@ -143,8 +152,13 @@ class BrickCache {
   static uint64_t charge(uint64_t splats, bool two_variables = false);
 
  private:
+  struct HashOfKey {
+    size_t operator()(const BrickKey& key) const {
+      return std::hash<uint64_t>()(uint64_t{key.merging} << 32 | key.brick);
+    }
+  };
   struct Entry {
-    uint32_t brick = 0;
+    BrickKey key{0};
     uint64_t bytes = 0, epoch = 0;
     std::byte* block = nullptr;
     GeometryArrays<float> geometry{};
@@ -162,7 +176,7 @@ class BrickCache {
   const bool two_variables_;
   mutable Mutex mutex_;  // guards the entries' pins and epochs, too
   Arena arena_ GUARDED_BY(mutex_);
-  std::unordered_map<uint32_t, Entry> entries_ GUARDED_BY(mutex_);
+  std::unordered_map<BrickKey, Entry, HashOfKey> entries_ GUARDED_BY(mutex_);
   std::list<Entry*> unpinned_ GUARDED_BY(mutex_);  // least recently used first
   uint64_t epoch_ GUARDED_BY(mutex_) = 0;
   uint64_t step_ = 0;  // counts stepChanged(), which nothing runs beside

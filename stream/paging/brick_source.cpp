@@ -7,6 +7,7 @@
 
 #include "stream/base/compute_permits.h"
 #include "stream/base/error.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -31,13 +32,6 @@ void clear(BrickSource::Scratch& scratch) {
   scratch.second.resize(0);
 }
 
-std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
-  std::vector<uint32_t> bricks;
-  bricks.reserve(parts.size());
-  for (const BrickPart& part : parts) bricks.push_back(part.brick);
-  return bricks;
-}
-
 }  // namespace
 
 BrickSource::BrickSource(const CacheReader& cache, const Variables& variables, const PagerOptions& pager,
@@ -49,17 +43,35 @@ BrickSource::BrickSource(const CacheReader& cache, const Variables& variables, c
       kept_(kept_bytes),
       pager_(cache, variables, pager) {}
 
-void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded) {
+const LayerMerging* BrickSource::mergingOf(const BrickPart& part) const {
+  return part.merging == 0 ? nullptr : mergings_.at(part.merging - size_t{1}).get();
+}
+
+BrickKey BrickSource::keyOf(const BrickPart& part) const {
+  const LayerMerging* const merging = mergingOf(part);
+  return {part.brick, merging ? merging->number : 0};
+}
+
+std::vector<BrickKey> BrickSource::keysOf(std::span<const BrickPart> parts) const {
+  std::vector<BrickKey> keys;
+  keys.reserve(parts.size());
+  for (const BrickPart& part : parts) keys.push_back(keyOf(part));
+  return keys;
+}
+
+void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded,
+                        const Mergings& mergings) {
   parts_.assign(parts.begin(), parts.end());
-  const std::vector<uint32_t> bricks = bricksOf(parts);
-  cached_.beginEpoch(bricks);
+  mergings_ = mergings;
+  const std::vector<BrickKey> keys = keysOf(parts);
+  cached_.beginEpoch(keys);
   pins_.clear();
   misses_.clear();
   std::vector<uint32_t> to_read;
-  for (const uint32_t brick : bricks) {
-    pins_.push_back(cached_.find(brick));
+  for (const BrickKey& key : keys) {
+    pins_.push_back(cached_.find(key));
     misses_.push_back(static_cast<uint32_t>(to_read.size()));
-    if (!pins_.back()) to_read.push_back(brick);
+    if (!pins_.back()) to_read.push_back(key.brick);
   }
   before_ = pager_.statistics();
   reads_ = to_read.size();
@@ -99,11 +111,7 @@ std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint
     return readAlone(part, scratch);
   }
   try {
-    if (auto slot = cached_.makeSlot(part.brick, cache_.bricks()[part.brick].splats)) {
-      decode(part.brick, *bytes, *slot, scratch);
-      return splatsOf(std::move(*slot).keep(), part);
-    }
-    decode(part.brick, *bytes, scratch);
+    if (auto pin = decodeInto(part, *bytes, scratch)) return splatsOf(*std::move(pin), part);
     return splatsOf(scratch, part);
   } catch (const DamagedBrick&) {
     // io_uring can have given other bytes than the file has (FUSE with direct_io and short reads, Linux 6.18). If not, this
@@ -111,6 +119,35 @@ std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint
   }
   bytes.reset();
   return readAlone(part, scratch);
+}
+
+/// Decodes a part into the cache if that has space, otherwise into the scratch.
+std::optional<BrickCache::Pin> BrickSource::decodeInto(const BrickPart& part, const PagedBrick& bytes,
+                                                       Scratch& scratch) {
+  if (!mergingOf(part)) {
+    if (auto slot = cached_.makeSlot(part.brick, cache_.bricks()[part.brick].splats)) {
+      decode(part.brick, bytes, *slot, scratch);
+      return std::move(*slot).keep();
+    }
+    decode(part.brick, bytes, scratch);
+    return {};
+  }
+  decode(part.brick, bytes, scratch);
+  merge(part, scratch);
+  auto slot = cached_.makeSlot(keyOf(part), static_cast<uint32_t>(scratch.geometry.size()));
+  if (!slot) return {};
+  copyGeometry(arraysOf(std::as_const(scratch.geometry)), slot->geometry());
+  copyValues(arraysOf(std::as_const(scratch.values)), slot->values());
+  if (second_) copyValues(arraysOf(std::as_const(scratch.second)), slot->second());
+  return std::move(*slot).keep();
+}
+
+void BrickSource::merge(const BrickPart& part, Scratch& scratch) const {
+  const LayerMerging* const merging = mergingOf(part);
+  if (!merging) return;
+  const TraceScope trace("merge layers");
+  scratch.merger.merge(*merging, cache_.bricks()[part.brick].largest_radius, scratch.geometry, scratch.values,
+                       second_ ? &scratch.second : nullptr);
 }
 
 /// The values of a brick whose geometry is there, of this step. They are read by the worker: a few pages, which the
@@ -139,13 +176,23 @@ BrickSource::Splats BrickSource::readAlone(const BrickPart& part, Scratch& scrat
   cache_.readGeometry(part.brick, scratch.geometry, nullptr, &scratch.times);
   cache_.readVariable(part.brick, variable_, scratch.values, &scratch.times);
   if (second_) cache_.readVariable(part.brick, *second_, scratch.second, &scratch.times);
+  merge(part, scratch);
   return splatsOf(scratch, part);
+}
+
+/// The splats of a part that are there: those that layers were merged to, or those that are stored.
+SplatRanges BrickSource::rangesOf(const BrickPart& part, size_t decoded) const {
+  if (!mergingOf(part)) return {cache_.bricks()[part.brick], part.octants};
+  Brick merged;
+  merged.splats = static_cast<uint32_t>(decoded);
+  return {merged, kAllOctants};
 }
 
 BrickSource::Splats BrickSource::splatsOf(BrickCache::Pin pin, const BrickPart& part) const {
   const Brick& brick = cache_.bricks()[part.brick];
   const auto second = second_ ? std::optional(pin.second()) : std::nullopt;
-  return {pin.geometry(), pin.values(), SplatRanges(brick, part.octants), brick.cell, std::move(pin), second};
+  const SplatRanges ranges = rangesOf(part, pin.geometry().size());
+  return {pin.geometry(), pin.values(), ranges, brick.cell, std::move(pin), second};
 }
 
 BrickSource::Splats BrickSource::splatsOf(const Scratch& scratch, const BrickPart& part) const {
@@ -153,7 +200,7 @@ BrickSource::Splats BrickSource::splatsOf(const Scratch& scratch, const BrickPar
   const auto second = second_ ? std::optional(arraysOf(scratch.second)) : std::nullopt;
   return {arraysOf(scratch.geometry),
           arraysOf(scratch.values),
-          SplatRanges(brick, part.octants),
+          rangesOf(part, scratch.geometry.size()),
           brick.cell,
           std::nullopt,
           second};
@@ -249,52 +296,50 @@ void BrickSource::keepPart(const BrickPart& part, uint32_t ancestor, Scratch& sc
   for (float& weight : scratch.geometry.weight) weight *= share;
 }
 
-void BrickSource::startPrefetch(std::span<const BrickPart> parts) {
-  const std::vector<uint32_t> bricks = bricksOf(parts);
-  cached_.beginEpoch(bricks);
+void BrickSource::startPrefetch(std::span<const BrickPart> parts, const Mergings& mergings) {
+  mergings_ = mergings;
+  cached_.beginEpoch(keysOf(parts));
   parts_.clear();
   pins_.clear();
   to_prefetch_.clear();
   to_refresh_.clear();
   uint64_t bytes = 0;
+  std::vector<uint32_t> to_read;
   std::unordered_set<uint32_t> seen;
-  for (const uint32_t brick : bricks) {
-    if (!seen.insert(brick).second) continue;
-    bytes += BrickCache::charge(cache_.bricks()[brick].splats, second_.has_value());
+  for (const BrickPart& part : parts) {
+    if (!seen.insert(part.brick).second) continue;
+    bytes += BrickCache::charge(cache_.bricks()[part.brick].splats, second_.has_value());
     if (bytes > cached_.capacity()) break;
-    if (!cached_.contains(brick))
-      to_prefetch_.push_back(brick);
-    else if (cached_.isStale(brick))
-      to_refresh_.push_back(brick);
+    if (!cached_.contains(keyOf(part))) {
+      to_prefetch_.push_back(part);
+      to_read.push_back(part.brick);
+    } else if (cached_.isStale(keyOf(part))) {
+      to_refresh_.push_back(part);
+    }
   }
   next_prefetch_ = 0;
   prefetch_stopped_ = false;
-  pager_.start(to_prefetch_);
+  pager_.start(std::move(to_read));
 }
 
 bool BrickSource::prefetchNext(Scratch& scratch) {
   uint64_t sequence = next_prefetch_++;
   if (sequence < to_refresh_.size()) {
     if (prefetch_stopped_) return false;
-    const uint32_t brick = to_refresh_[sequence];
-    if (const auto pin = cached_.find(brick)) refresh(*pin, brick, scratch);
+    const BrickPart& part = to_refresh_[sequence];
+    if (const auto pin = cached_.find(keyOf(part))) refresh(*pin, part.brick, scratch);
     return true;
   }
   sequence -= to_refresh_.size();
   if (sequence >= to_prefetch_.size()) return false;
   const std::optional<PagedBrick> bytes = await(sequence, scratch);
   if (!bytes) return false;
-  const uint32_t brick = to_prefetch_[sequence];
   if (!bytes->readable()) return true;  // the frame will tell
-  auto slot = cached_.makeSlot(brick, cache_.bricks()[brick].splats);
-  if (!slot) return false;
   try {
-    decode(brick, *bytes, *slot, scratch);
+    return decodeInto(to_prefetch_[sequence], *bytes, scratch).has_value();
   } catch (const DamagedBrick&) {
     return true;  // the frame reads it again
   }
-  std::move(*slot).keep();
-  return true;
 }
 
 void BrickSource::stop() {

@@ -12,6 +12,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -22,6 +23,7 @@
 #include "stream/model/octree.h"
 #include "stream/model/splats.h"
 #include "stream/paging/brick_cache.h"
+#include "stream/paging/layer_merger.h"
 #include "stream/paging/pager.h"
 
 namespace curvisplat {
@@ -53,6 +55,7 @@ class BrickSource {
   struct Scratch {
     SplatGeometry geometry;
     SplatVariable values, second;
+    LayerMerger merger;
     ReadTimes times;
     double waited_s = 0;
   };
@@ -68,9 +71,13 @@ class BrickSource {
     std::optional<VariableArrays<const float>> second = std::nullopt;  // where there is a second variable
   };
 
+  /// How layers are merged in a frame: BrickPart::merging counts from 1.
+  using Mergings = std::vector<std::shared_ptr<const LayerMerging>>;
+
   /// Begins a frame of at most one part of each brick. No thread may be in fetch(). `unneeded`: see
   /// BrickPager.
-  void start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded = {});
+  void start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded = {},
+             const Mergings& mergings = {});
   /// The splats of the `sequence`-th part; once for each part, on any thread. nullopt after stop(). No splats if
   /// `unneeded` returned true for the brick. Throws as CacheReader does, DamagedBrick or Error, and Error if
   /// the pager failed.
@@ -86,7 +93,7 @@ class BrickSource {
   void stepChanged();
 
   /// Begins to fill the cache with the bricks of `parts`, in their order, as far as they fit.
-  void startPrefetch(std::span<const BrickPart> parts);
+  void startPrefetch(std::span<const BrickPart> parts, const Mergings& mergings = {});
   /// Takes the next brick of the prefetch. False if none is left, if the cache is full, or after stop().
   /// Throws as fetch() does.
   bool prefetchNext(Scratch& scratch);
@@ -103,6 +110,12 @@ class BrickSource {
   std::optional<Splats> read(const BrickPart& part, uint64_t miss, Scratch& scratch);
   void refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch);
   Splats readAlone(const BrickPart& part, Scratch& scratch) const;
+  const LayerMerging* mergingOf(const BrickPart& part) const;
+  BrickKey keyOf(const BrickPart& part) const;
+  std::vector<BrickKey> keysOf(std::span<const BrickPart> parts) const;
+  void merge(const BrickPart& part, Scratch& scratch) const;
+  std::optional<BrickCache::Pin> decodeInto(const BrickPart& part, const PagedBrick& bytes, Scratch& scratch);
+  SplatRanges rangesOf(const BrickPart& part, size_t decoded) const;
   Splats splatsOf(BrickCache::Pin pin, const BrickPart& part) const;
   Splats splatsOf(const Scratch& scratch, const BrickPart& part) const;
   void decode(uint32_t brick, const PagedBrick& bytes, const BrickCache::Slot& slot, Scratch& scratch);
@@ -118,10 +131,11 @@ class BrickSource {
   KeptValues kept_;  // of this step and others: those that it is predicted from, or lies between
   BrickPager pager_;
 
-  std::vector<BrickPart> parts_;                      // [sequence]
+  std::vector<BrickPart> parts_;  // [sequence]
+  Mergings mergings_;
   std::vector<std::optional<BrickCache::Pin>> pins_;  // [sequence]
   std::vector<uint32_t> misses_;                      // [sequence]: place among those read
-  std::vector<uint32_t> to_prefetch_, to_refresh_;
+  std::vector<BrickPart> to_prefetch_, to_refresh_;
   uint64_t reads_ = 0, hits_ = 0;  // bricks that the pager was asked for, and that it was not
   std::atomic<uint64_t> next_prefetch_ = 0;
   std::atomic<bool> prefetch_stopped_ = false;

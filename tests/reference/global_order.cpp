@@ -6,6 +6,7 @@
 #include "render/frame/frame_plan.h"
 #include "render/project/footprint.h"
 #include "render/project/tile_key.h"
+#include "stream/paging/layer_merger.h"
 
 namespace curvisplat {
 namespace {
@@ -63,14 +64,21 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_
   std::vector<Placed> placed;
   BrickProjector projector;
   std::vector<uint32_t> keys;
-  for (const BrickPart& part : plan.cut.parts) {
+  for (const SweptPart& swept : plan.parts) {
+    const BrickPart& part = swept.part;
     const Brick& brick = cache.bricks()[part.brick];
     SplatGeometry geometry;
     SplatVariable values;
     cache.readGeometry(part.brick, geometry);
     cache.readVariable(part.brick, 0, values);
+    SplatRanges ranges(brick, part.octants);
+    if (part.merging > 0) {
+      LayerMerger().merge(*plan.mergings[part.merging - 1u], brick.largest_radius, geometry, values, nullptr);
+      Brick merged;
+      merged.splats = static_cast<uint32_t>(geometry.size());
+      ranges = {merged, kAllOctants};
+    }
     const glm::dvec3 corner = cache.manifest().root.cellMin(brick.cell);
-    const SplatRanges ranges(brick, part.octants);
     projector.project(plan.settings, planner.table(), corner, arraysOf(geometry), arraysOf(values),
                       {ranges.begin(), ranges.end()});
     keys.resize(projector.depths().size());

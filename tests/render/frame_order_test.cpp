@@ -210,6 +210,33 @@ TEST_P(FrameOrderTest, IsThatOfOneSortWithClipPlanesAndLight) {
   EXPECT_GT(most_slabs, 1u);
 }
 
+// Thin cells, 200 times as long as thick, of whose layers several lie in a pixel.
+TEST_P(FrameOrderTest, MergesLayersOfThinCellsToOnePictureInAnyMemoryWithAnyThreads) {
+  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
+  convertGrid(SceneGridSource(makeScene("boundary-layer"), {48, 40, 48}), *folder_ / "layers.splats");
+  const CacheReader cache(*folder_ / "layers.splats");
+  const TransferFunction transfer_function = function(cache);
+  FrameRenderer renderer(cache, 0, transfer_function, GetParam());
+  const Camera camera = looking(cache, glm::normalize(glm::dvec3(0.6, 0.64, 0.48)));
+  FrameStatistics statistics;
+  const Image finest = renderer.render(camera, options(), statistics);
+  const uint64_t stored = statistics.splats_drawn;
+  const Image expected = globallySorted(cache, transfer_function, GetParam(), camera, options(1));
+  EXPECT_GT(compareImages(expected, finest).psnr_db, 45);
+  FrameOptions wanted = options(1);
+  const uint64_t least = leastMemory(renderer, camera, wanted);
+  for (const uint64_t memory : {least, uint64_t{1} << 30})
+    for (const unsigned threads : {1u, 3u, 3u}) {  // again with the bricks that the last picture has left
+      wanted.memory_bytes = memory;
+      wanted.threads = threads;
+      EXPECT_EQ(renderer.render(camera, wanted, statistics).rgba, expected.rgba) << memory << ' ' << threads;
+      EXPECT_LT(statistics.splats_drawn, 0.6 * static_cast<double>(stored));
+    }
+  wanted.light.emplace();  // shows the splats themselves
+  renderer.render(camera, wanted, statistics);
+  EXPECT_EQ(statistics.splats_drawn, stored);
+}
+
 // The order includes what stands in for a damaged brick; and each is reported once.
 TEST_P(FrameOrderTest, IsTheSameInSlabsWhereBricksAreDamaged) {
   if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";

@@ -119,6 +119,17 @@ TEST_F(SharedPicture, HasTheBitsWhereMuchIsHidden) {
   expectSameBits({scene_.get(), camera(*scene_), options(), 1e-4});
 }
 
+TEST_F(SharedPicture, HasTheBitsWhereLayersAreMerged) {
+  const TemporaryFolder folder;
+  convertGrid(SceneGridSource(makeScene("boundary-layer"), {48, 40, 48}), folder / "layers.splats");
+  const CacheReader layers(folder / "layers.splats");
+  const Case what{&layers, camera(layers), options()};
+  expectSameBits(what);
+  Case finest = what;
+  finest.options.lod_pixels = 0;
+  EXPECT_NE(draw(what, 1).image.rgba, draw(finest, 1).image.rgba);
+}
+
 TEST_F(SharedPicture, HasTheBitsUnderALimitAndInLittleMemory) {
   FrameOptions limited = options();
   limited.max_splats = 40000;
