@@ -50,6 +50,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);
   if (description.pieces.empty()) manifest.stretch = kDualCells;
   manifest.refinement = description.refinement;
+  manifest.globe = description.globe;
   manifest.nodes = survey.nodes;
   manifest.blanked_nodes = survey.blanked.total();
   manifest.grid_checksum = survey.grid_checksum;

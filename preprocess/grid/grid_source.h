@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "stream/model/globe.h"
 #include "stream/model/refinement.h"
 
 namespace curvisplat {
@@ -94,6 +95,7 @@ struct GridDescription {
   std::vector<double> times;          // of every time step; empty: the files have none
   uint32_t time_step = 0;             // index of the open one
   std::string time_unit, calendar;    // of the times, by the CF conventions; may be empty
+  std::optional<Globe> globe;         // that places its nodes, if the files are of the Earth
   Refinement refinement;              // the parts that cells of the files are cut into
   std::string blanking;               // the files' rule for blanking in words; empty: iblank or the like
   std::string undefined;              // fill values, which are read as NaN: "T = -999"; may be empty

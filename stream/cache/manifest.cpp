@@ -43,6 +43,29 @@ Json jsonOf(const glm::dvec3& v) {
   return Json::array({v.x, v.y, v.z});
 }
 
+constexpr const char* kGlobeShapes[] = {"sphere", "map", "lengths"};  // in the order of Globe::Shape
+
+Json jsonOf(const Globe& globe) {
+  return {{"shape", kGlobeShapes[static_cast<size_t>(globe.shape)]},
+          {"radius", globe.radius_km},
+          {"vertical_scale", globe.vertical_scale},
+          {"middle_longitude", globe.middle_longitude}};
+}
+
+Globe globeIn(const JsonField& field) {
+  Globe globe;
+  const JsonField shape = field.at("shape"), radius = field.at("radius");
+  const auto* const found = std::find(std::begin(kGlobeShapes), std::end(kGlobeShapes), shape.text());
+  if (found == std::end(kGlobeShapes)) shape.fail("\"sphere\", \"map\" or \"lengths\"");
+  globe.shape = static_cast<Globe::Shape>(found - std::begin(kGlobeShapes));
+  globe.radius_km = radius.number();
+  if (!(globe.radius_km > 0 && globe.radius_km <= kLargestCoordinate))
+    radius.fail(fmt::format("a number above 0, up to {}", kLargestCoordinate));
+  globe.vertical_scale = field.at("vertical_scale").number();
+  globe.middle_longitude = field.at("middle_longitude").number();
+  return globe;
+}
+
 /// Checksums are strings of 16 hexadecimal digits, because many JSON readers convert numbers to doubles.
 uint64_t checksumIn(const JsonField& field) {
   const std::string digits = field.text();
@@ -249,6 +272,7 @@ std::string Manifest::toJson() const {
   if (grid_checksum) json["grid_checksum"] = fmt::format("{:016x}", *grid_checksum);
   if (!time_unit.empty()) json["time_unit"] = time_unit;
   if (!calendar.empty()) json["calendar"] = calendar;
+  if (globe) json["globe"] = jsonOf(*globe);
   json["variables"] = Json::array();
   for (const VariableInfo& variable : variables)
     json["variables"].push_back({{"number", variable.number},
@@ -314,6 +338,7 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   if (const auto checksum = fields.find("grid_checksum")) manifest.grid_checksum = checksumIn(*checksum);
   if (const auto unit = fields.find("time_unit")) manifest.time_unit = lineOf(*unit);
   if (const auto calendar = fields.find("calendar")) manifest.calendar = lineOf(*calendar);
+  if (const auto globe = fields.find("globe")) manifest.globe = globeIn(*globe);
   readVariables(fields.at("variables"), manifest);
   readSteps(fields.at("steps"), manifest);
   if (const auto own = fields.find("own_blanks")) readOwnBlanks(*own, manifest);

@@ -16,6 +16,7 @@
 
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
+#include "stream/model/globe.h"
 #include "stream/model/octree.h"
 #include "stream/model/refinement.h"
 
@@ -125,8 +126,9 @@ struct Manifest {
   bool isSteep() const { return stretch == kSteepStretch || stretch == kDualCells; }
   std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
                                           // their geometry (preprocess/survey/grid_survey.h)
-  std::string time_unit;  // of the steps' times, such as "days since 1900-01-01"; may be empty
-  std::string calendar;   // of the time unit, by the CF conventions; may be empty
+  std::string time_unit;       // of the steps' times, such as "days since 1900-01-01"; may be empty
+  std::string calendar;        // of the time unit, by the CF conventions; may be empty
+  std::optional<Globe> globe;  // that has placed the nodes of a grid in degrees, or of another map
   std::vector<VariableInfo> variables;
   std::vector<StepInfo> steps;
   std::vector<OwnBlanks> own_blanks;  // empty without kOwnBlanks

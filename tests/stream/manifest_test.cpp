@@ -55,6 +55,12 @@ TEST(Manifest, RoundTrips) {
   EXPECT_EQ(back.files[1].checksum, ~uint64_t{0});
   EXPECT_EQ(back.blocks[1].ni, uint64_t{1} << 40);
   EXPECT_EQ(back.steps[0].variables, m.steps[0].variables);
+  EXPECT_FALSE(back.globe) << "of a manifest that does not say";
+  for (const auto shape : {Globe::Shape::kSphere, Globe::Shape::kFlat, Globe::Shape::kLengths}) {
+    Manifest on_globe = m;
+    on_globe.globe = Globe{shape, 6371.25, 50, -30};
+    EXPECT_EQ(Manifest::fromJson(on_globe.toJson(), "manifest.json").globe, on_globe.globe);
+  }
   EXPECT_FALSE(back.refinement.cutsCells()) << "of a manifest that does not say";
   Manifest refined = m;
   refined.refinement = Refinement(4);

@@ -63,7 +63,7 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
   const bool radians = unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID");
   const bool plane = length.has_value() || map_.longitude->name == "xVertex";
   to_degrees_ = plane ? length.value_or(1e-3) : radians ? 180 / std::numbers::pi : 1;
-  globe_.emplace(options.globe, !plane, 0.0);
+  globe_ = globeWith(options.globe, !plane, 0.0);
   if (heights_.levels.empty()) spoolHeights(options.temporary_folder);
   describe(options);
 }
@@ -88,6 +88,7 @@ void ColumnsSource::findTimes(const OpenGridOptions& options) {
 void ColumnsSource::describe(const OpenGridOptions& options) {
   description_.files = file_.paths();
   description_.coordinate_bytes = 8;
+  description_.globe = globe_;
   const bool cells = scalars_.centring == Centring::kCell;
   const uint64_t prisms = cells ? scalars_.layers : scalars_.layers - 1;
   description_.pieces.push_back({fmt::format("{} faces, {} layers", map_.faces, prisms),
@@ -98,8 +99,8 @@ void ColumnsSource::describe(const OpenGridOptions& options) {
       scalar.aliases.push_back(name);
     description_.scalars.push_back(std::move(scalar));
   }
-  const std::string shape = globe_->sphere() ? fmt::format("on a sphere of {:g} km", options.globe.radius_km)
-                                             : std::string("on a flat map");
+  const std::string shape = globe_.sphere() ? fmt::format("on a sphere of {:g} km", options.globe.radius_km)
+                                            : std::string("on a flat map");
   description_.format =
       fmt::format("{} ({}), {} faces, {}, heights of {} times {:g}, in km", map_.format, file_.kind(),
                   map_.faces, shape, heights_.words, options.globe.vertical_scale);
@@ -247,8 +248,8 @@ void ColumnsSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::sp
     for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n) {
       const uint64_t column = n / part.layers, layer = n % part.layers;
       out.hidden.push_back(values_at_nodes && static_cast<double>(part.layer + layer) >= layers[column]);
-      const GlobePlace place = globe_->place(globe_->column(longitude[column], latitude[column]),
-                                             heights[layer * part.columns + column]);
+      const glm::dvec3 place = globe_.place(globe_.column(longitude[column], latitude[column]),
+                                            heights[layer * part.columns + column]);
       out.x.push_back(place.x);
       out.y.push_back(place.y);
       out.z.push_back(place.z);

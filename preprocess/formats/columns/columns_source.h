@@ -58,7 +58,7 @@ class ColumnsSource final : public MeshSource {
   ColumnsScalars scalars_;
   ColumnsHeights heights_;
   double to_degrees_ = 1;  // of longitudes; of lengths, kilometres
-  std::optional<Globe> globe_;
+  Globe globe_;
   SpooledNumbers node_heights_;  // [level][node], if heights_.levels is empty
   ColumnsBottom bottom_;
 };

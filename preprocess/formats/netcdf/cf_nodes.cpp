@@ -95,7 +95,7 @@ void CfNodes::readBlank(const CfRange& range, std::vector<uint8_t>& blank) const
 }
 
 /// The columns of the box's nodes; those of its first plane only where one column serves all levels.
-void CfNodes::readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const {
+void CfNodes::readColumns(const CfRange& range, std::vector<glm::dvec3>& columns) const {
   if (grid_.degrees && grid_.longitude.ofCorners() && grid_.latitude.ofCorners())
     return readMiddles(range, columns);
   const CfValues east = grid_.longitude.read(files_, range), north = grid_.latitude.read(files_, range);
@@ -123,7 +123,7 @@ void CfNodes::readColumns(const CfRange& range, std::vector<GlobeColumn>& column
 }
 
 /// Columns in the middle of their cells' corners: on the sphere, since longitudes have no mean around a pole.
-void CfNodes::readMiddles(const CfRange& range, std::vector<GlobeColumn>& columns) const {
+void CfNodes::readMiddles(const CfRange& range, std::vector<glm::dvec3>& columns) const {
   const NetcdfBox box = grid_.longitude.boxOf(range);
   std::vector<double> longitudes(box.values()), latitudes(box.values());
   files_.read(grid_.longitude.variable(), box, longitudes);
@@ -146,15 +146,13 @@ void CfNodes::readMiddles(const CfRange& range, std::vector<GlobeColumn>& column
 }
 
 std::vector<glm::dvec3> CfNodes::points(const CfRange& range) const {
-  std::vector<GlobeColumn> columns;
+  std::vector<glm::dvec3> columns;
   readColumns(range, columns);
-  std::vector<glm::dvec3> points;
-  for (const GlobeColumn& column : columns) points.push_back({column.x, column.y, column.z});
-  return points;
+  return columns;
 }
 
 void CfNodes::readPlaces(const CfRange& range, NodeArrays& out) const {
-  std::vector<GlobeColumn> columns;
+  std::vector<glm::dvec3> columns;
   const bool read = grid_.vertical.readNodes(files_, range, out.z);
   CfValues height;
   size_t n = 0;
@@ -167,7 +165,7 @@ void CfNodes::readPlaces(const CfRange& range, NodeArrays& out) const {
         for (uint64_t i = 0; i < lengthOf(piece, 0); ++i, ++n, ++column) {
           if (column == columns.size()) column = 0;
           const double own = read ? out.z[n] : height.at(i, j, k);
-          const GlobePlace place = globe_.place(
+          const glm::dvec3 place = globe_.place(
               columns[column], !globe_.degrees() || std::abs(own) <= kMaxHeight ? own : std::nan(""));
           out.x[n] = place.x;
           out.y[n] = place.y;

@@ -35,8 +35,8 @@ class CfNodes {
 
  private:
   void readPlaces(const CfRange& range, NodeArrays& out) const;
-  void readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const;
-  void readMiddles(const CfRange& range, std::vector<GlobeColumn>& columns) const;
+  void readColumns(const CfRange& range, std::vector<glm::dvec3>& columns) const;
+  void readMiddles(const CfRange& range, std::vector<glm::dvec3>& columns) const;
   void blankFirstLevel(const CfRange& range, std::vector<uint8_t>& blank) const;
   void applyMask(const CfRange& range, std::vector<uint8_t>& blank) const;
   void readBlank(const CfRange& range, std::vector<uint8_t>& blank) const;

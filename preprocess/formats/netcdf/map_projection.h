@@ -1,7 +1,5 @@
-// Converts the horizontal coordinates of a file to positions in the world. MapProjection converts the
-// coordinates of a map projection, or of a rotated pole, to longitude and latitude. Globe converts
-// longitude, latitude and height to positions on a sphere, or on a flat map (equirectangular projection).
-// World units are kilometres, horizontally and vertically.
+// Converts the horizontal coordinates of a file to longitude and latitude: MapProjection those of a map projection, or of a
+// rotated pole. Globe (stream/model/globe.h) places them in the world.
 //
 // Any number of threads may convert; PROJ's calls run one after the other.
 #pragma once
@@ -14,6 +12,7 @@
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/netcdf/netcdf_files.h"
+#include "stream/model/globe.h"
 
 namespace curvisplat {
 
@@ -45,38 +44,8 @@ class MapProjection {
   std::shared_ptr<const Proj> proj_;
 };
 
-/// The horizontal part of a position: the unit vector of a longitude and a latitude, or a point of the map.
-struct GlobeColumn {
-  double x = 0, y = 0, z = 0;  // sphere: of length 1; map: x and y in kilometres, z = 0
-};
-
-/// A position in the world, in kilometres.
-struct GlobePlace {
-  double x = 0, y = 0, z = 0;
-};
-
-/// The sphere or the flat map on which a grid in degrees lies; a grid in lengths stays flat.
-class Globe {
- public:
-  /// `middle_longitude`, in degrees: the map is cut on the opposite side.
-  Globe(const GlobeOptions& options, bool degrees, double middle_longitude);
-
-  bool sphere() const { return sphere_; }
-  bool degrees() const { return degrees_; }
-
-  /// A column from degrees east and north, or from kilometres if the grid has lengths.
-  GlobeColumn column(double longitude, double latitude) const;
-
-  GlobePlace place(const GlobeColumn& column, double height_km) const {
-    const double height = height_km * vertical_scale_;
-    if (!sphere_) return {column.x, column.y, height};
-    const double radius = radius_km_ + height;
-    return {radius * column.x, radius * column.y, radius * column.z};
-  }
-
- private:
-  bool sphere_, degrees_;
-  double radius_km_, vertical_scale_, middle_longitude_;
-};
+/// The sphere or the flat map on which a grid in degrees lies; a grid in lengths stays flat. `middle_longitude`: of a flat
+/// map, in degrees.
+Globe globeWith(const GlobeOptions& options, bool degrees, double middle_longitude);
 
 }  // namespace curvisplat

@@ -213,11 +213,12 @@ Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
     double latitude = grid_.latitude.read(file_, middle).values.at(0);
     if (grid_.projection) grid_.projection->toGeographic({&longitude, 1}, {&latitude, 1});
   }
-  return Globe(options, degrees, longitude);
+  return globeWith(options, degrees, longitude);
 }
 
 void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.files = file_.paths();
+  if (!grid_.indices) description_.globe = globe_;
   const CfTimes times = cfTimes(file_, grid_);
   description_.times = times.values;
   description_.time_unit = times.unit;
