@@ -6,6 +6,7 @@
 #include <glm/vec4.hpp>
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "render/colour/transfer_function.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
+#include "stream/model/globe.h"
 
 namespace curvisplat {
 
@@ -41,6 +43,16 @@ struct AnnotatedScene {
   glm::vec4 background{1, 1, 1, 1};   // text and lines are black if it is light, else white
   std::array<std::string, 3> axis_titles{"x", "y", "z"};  // of the axes grid
   std::string title = {}, label = {};                     // above the data, and in its upper left corner
+
+  /// A box of longitude, latitude (degrees) and height (kilometres).
+  struct OnGlobe {
+    Globe globe;
+    glm::dvec3 lower, upper;
+
+    /// Whether most of its heights are below zero: the axis has depths.
+    bool isOfDepths() const { return lower.z + upper.z < 0; }
+  };
+  std::optional<OnGlobe> on_globe = std::nullopt;  // the axes grid is this box
 };
 
 /// A round number on a scale.

@@ -4,7 +4,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <glm/common.hpp>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <system_error>
 
@@ -25,20 +27,98 @@ std::pair<float, float> CurveSet::range() const {
 }
 
 CurveSet curveSetOf(const std::vector<glm::dvec3>& points, std::vector<uint32_t> begins,
-                    std::vector<float> values) {
+                    std::vector<float> values, std::vector<double> times) {
   CurveSet set;
   if (!points.empty()) set.origin = points.front();
   set.positions.reserve(points.size());
   for (const glm::dvec3& point : points) set.positions.emplace_back(point - set.origin);
   set.begins = std::move(begins);
   set.values = std::move(values);
+  set.times = std::move(times);
   return set;
+}
+
+CurveSet pointsOf(CurveSet set) {
+  set.begins.resize(set.positions.size() + 1);
+  std::iota(set.begins.begin(), set.begins.end(), 0u);
+  return set;
+}
+
+namespace {
+
+/// Appends points of a set with times to another one of the same origin.
+class PartOfSet {
+ public:
+  explicit PartOfSet(const CurveSet& whole) : whole_(whole) {
+    part_.origin = whole.origin;
+    part_.positions.reserve(whole.positions.size());
+  }
+
+  void add(size_t point) { addBetween(point, point, 0); }
+  /// The place a part of the way from a point to the next.
+  void addBetween(size_t point, size_t next, double part) {
+    const auto mixed = static_cast<float>(part);
+    part_.positions.push_back(glm::mix(whole_.positions[point], whole_.positions[next], mixed));
+    part_.times.push_back(whole_.times[point] + part * (whole_.times[next] - whole_.times[point]));
+    if (whole_.values.empty()) return;
+    const float from = whole_.values[point], to = whole_.values[next];
+    part_.values.push_back(part == 0 ? from : from + mixed * (to - from));
+  }
+  /// The place between the point before `next` and it at a time; nothing where they are one.
+  void addAt(double time, size_t next) {
+    const double from = whole_.times[next - 1], to = whole_.times[next];
+    if (from < to) addBetween(next - 1, next, (time - from) / (to - from));
+  }
+  void endLine() {
+    const auto end = static_cast<uint32_t>(part_.positions.size());
+    if (part_.begins.back() < end) part_.begins.push_back(end);
+  }
+  CurveSet finish() { return std::move(part_); }
+
+ private:
+  const CurveSet& whole_;
+  CurveSet part_;
+};
+
+}  // namespace
+
+CurveSet partBetween(const CurveSet& set, double from, double to) {
+  PartOfSet part(set);
+  for (size_t line = 0; line < set.lines(); ++line) {
+    const size_t begin = set.begins[line], end = set.begins[line + 1];
+    const auto timeOf = [&](size_t n) { return set.times[n]; };
+    for (size_t n = begin; n < end; ++n) {
+      if (n > begin && timeOf(n - 1) < from && timeOf(n) > from) part.addAt(from, n);
+      if (timeOf(n) >= from && timeOf(n) <= to) part.add(n);
+      if (n > begin && timeOf(n - 1) < to && timeOf(n) > to && to > from) part.addAt(to, n);
+    }
+    part.endLine();
+  }
+  return part.finish();
+}
+
+CurveSet placesAt(const CurveSet& set, double time) {
+  PartOfSet part(set);
+  for (size_t line = 0; line < set.lines(); ++line) {
+    const auto begin = set.times.begin() + set.begins[line], end = set.times.begin() + set.begins[line + 1];
+    const auto next = std::lower_bound(begin, end, time);
+    if (next == end) continue;
+    const auto n = static_cast<size_t>(next - set.times.begin());
+    if (*next == time)
+      part.add(n);
+    else if (next != begin)
+      part.addAt(time, n);
+    part.endLine();
+  }
+  return part.finish();
 }
 
 namespace {
 
 constexpr size_t kMaxColumns = 1000;
 constexpr double kMaxCoordinate = 1e38;  // differences of two are finite in single precision
+constexpr const char *kAxisNames[] = {"x", "y", "z"},
+                     *kGeographicNames[] = {"longitude", "latitude", "height"};
 
 class Rows {
  public:
@@ -96,10 +176,14 @@ class Rows {
   size_t at_ = 0, number_ = 0;
 };
 
+constexpr size_t kNoColumn = std::numeric_limits<size_t>::max();
+
 /// The meaning of the columns.
 struct Columns {
-  std::array<size_t, 3> position{0, 1, 2};
-  std::optional<size_t> id, scalar;
+  std::array<size_t, 3> position{0, 1, 2};  // kNoColumn: of a height that is not given
+  std::optional<size_t> id, scalar, time;
+  bool geographic = false;    // longitude, latitude and a height
+  double kilometres = 0.001;  // of the height's unit, upwards
   size_t count = 3;
 };
 
@@ -107,21 +191,31 @@ Columns columnsOf(const Rows& rows, const std::vector<std::string_view>& names, 
   Columns columns;
   columns.count = names.size();
   std::vector<std::string> scalars;
-  std::array<bool, 3> found{};
+  std::array<size_t, 3> along{kNoColumn, kNoColumn, kNoColumn}, on_globe = along;
   for (size_t n = 0; n < names.size(); ++n) {
     const std::string name(names[n]), lower = lowerCase(name);
     if (name == scalar) columns.scalar = n;
     if (lower == "id" || lower == "line" || lower == "trajectory") columns.id = n;
+    if (lower == "time") columns.time = n;
     const size_t axis = lower.size() == 1 ? std::string_view("xyz").find(lower) : std::string_view::npos;
-    if (axis < 3) {
-      columns.position[axis] = n;
-      found[axis] = true;
-    } else {
+    const bool is_depth = lower == "depth";
+    if (axis < 3)
+      along[axis] = n;
+    else if (lower == "lon" || lower == "longitude")
+      on_globe[0] = n;
+    else if (lower == "lat" || lower == "latitude")
+      on_globe[1] = n;
+    else
       scalars.push_back(name);
+    if (is_depth || lower == "height" || lower == "altitude") {
+      on_globe[2] = n;
+      columns.kilometres = is_depth ? -0.001 : 0.001;
     }
   }
-  if (!found[0] || !found[1] || !found[2])
-    rows.fail("has no columns x, y and z among {}; name them so", fmt::join(names, ", "));
+  columns.geographic = std::find(along.begin(), along.end(), kNoColumn) != along.end();
+  if (columns.geographic && (on_globe[0] == kNoColumn || on_globe[1] == kNoColumn))
+    rows.fail("has no columns x, y and z, nor lon and lat, among {}; name them so", fmt::join(names, ", "));
+  columns.position = columns.geographic ? on_globe : along;
   if (!scalar.empty() && !columns.scalar)
     rows.fail("has no column '{}'{}; it has {}", scalar, didYouMean(scalar, scalars),
               scalars.empty() ? "x, y and z only" : fmt::format("{}", fmt::join(scalars, ", ")));
@@ -131,11 +225,12 @@ Columns columnsOf(const Rows& rows, const std::vector<std::string_view>& names, 
 }  // namespace
 
 CurveSet parseCurveText(std::string_view text, const std::filesystem::path& path, const std::string& scalar,
-                        bool as_points) {
+                        const std::optional<Globe>& globe) {
   Rows rows(text, path);
   std::vector<glm::dvec3> points;
   std::vector<uint32_t> begins{0};
   std::vector<float> values;
+  std::vector<double> times;
   std::optional<Columns> columns;
   std::string id;
   const auto end_line = [&] {
@@ -149,6 +244,7 @@ CurveSet parseCurveText(std::string_view text, const std::filesystem::path& path
     if (!columns) {
       if (!rows.number(words[0])) {
         columns = columnsOf(rows, words, scalar);
+        if (columns->geographic) requireGlobe(globe, path);
         continue;
       }
       if (!scalar.empty())
@@ -159,13 +255,21 @@ CurveSet parseCurveText(std::string_view text, const std::filesystem::path& path
     }
     if (words.size() != columns->count)
       rows.fail("has {} columns; expected {}", words.size(), columns->count);
-    glm::dvec3 point;
+    glm::dvec3 point(0.0);
     for (int axis = 0; axis < 3; ++axis) {
-      const std::string_view word = words[columns->position[static_cast<size_t>(axis)]];
-      const auto number = rows.number(word);
+      const size_t column = columns->position[static_cast<size_t>(axis)];
+      if (column == kNoColumn) continue;
+      const auto number = rows.number(words[column]);
       if (!number || !(std::abs(*number) <= kMaxCoordinate))
-        rows.fail("found '{}' for {}; expected a number up to {:g}", word, "xyz"[axis], kMaxCoordinate);
+        rows.fail("found '{}' for {}; expected a number up to {:g}", words[column],
+                  columns->geographic ? kGeographicNames[axis] : kAxisNames[axis], kMaxCoordinate);
       point[axis] = *number;
+    }
+    if (columns->geographic) {
+      if (std::abs(point.x) > kMaxLongitude || std::abs(point.y) > kMaxLatitude)
+        rows.fail("found longitude {:g} and latitude {:g}; expected degrees", point.x, point.y);
+      if (std::abs(point.z) > kMaxMetres) rows.fail("found {:g} for height; expected metres", point.z);
+      point = globe->placeAt({point.x, point.y, columns->kilometres * point.z});
     }
     if (columns->id && words[*columns->id] != id) {
       end_line();
@@ -179,11 +283,19 @@ CurveSet parseCurveText(std::string_view text, const std::filesystem::path& path
       if (!number && !word.empty()) rows.fail("found '{}' for {}; expected a number", word, scalar);
       values.push_back(static_cast<float>(number.value_or(std::numeric_limits<double>::quiet_NaN())));
     }
-    if (as_points) end_line();
+    if (columns->time) {
+      const auto number = rows.number(words[*columns->time]);
+      if (!number || !std::isfinite(*number))
+        rows.fail("found '{}' for time; expected a number", words[*columns->time]);
+      if (begins.back() + 1 < points.size() && *number < times.back())
+        rows.fail("found the time {:g} after {:g}; expected times that do not decrease along a line", *number,
+                  times.back());
+      times.push_back(*number);
+    }
   }
   end_line();
   if (points.empty()) throw Error("{}: has no points; expected lines of x,y,z", path.string());
-  return curveSetOf(points, std::move(begins), std::move(values));
+  return curveSetOf(points, std::move(begins), std::move(values), std::move(times));
 }
 
 }  // namespace curvisplat

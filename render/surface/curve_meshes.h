@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "render/project/screen_view.h"
@@ -17,6 +18,11 @@ namespace curvisplat {
 
 /// The curves of a scene as surfaces, each in data coordinates.
 std::vector<Surface> curveSurfaces(const SurfaceScene& scene, const ScreenView& view);
+
+/// The curves at a time: what it shows of those that have times.
+std::vector<Curves> curvesAt(std::vector<Curves> curves, double time);
+/// The scene with them; itself if none have times, or null.
+std::shared_ptr<const SurfaceScene> sceneAtTime(std::shared_ptr<const SurfaceScene> scene, double time);
 
 /// Memory, at most, of curveSurfaces().
 uint64_t curveBytes(const SurfaceScene& scene);

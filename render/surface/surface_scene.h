@@ -88,6 +88,11 @@ struct Curves {
   std::shared_ptr<const TransferFunction> function = nullptr;  // that `colours` are of
   std::string title = {};                                      // of the values
   double opacity = 1;
+  // The whole trajectories, of which `set` is what a time shows (curvesAt() in curve_meshes.h); null: the set is the same at
+  // all times.
+  std::shared_ptr<const CurveSet> whole = nullptr;
+  std::optional<double> tail = std::nullopt;  // of the part, in time; none: all before that time
+  bool places = false;                        // points: where each is at that time
 };
 
 /// The surfaces, slices, isosurfaces and curves of a picture, and whether the volume is drawn.

@@ -169,15 +169,23 @@ void fuzzMesh(std::span<const std::byte> bytes) {
 
 const RegisteredFuzzTarget mesh_target("mesh", fuzzMesh);
 
-// Lines and points of a picture as text with columns. The first byte: points (1), and the scalar p (2).
+// Lines and points of a picture as text with columns, GeoJSON or a shapefile. The first byte: a globe (1), the scalar p (2),
+// GeoJSON (4), a shapefile (8).
 void fuzzCurveText(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   const auto choice = input.take<uint8_t>();
-  const CurveSet set =
-      parseCurveText(textOf(input.rest()), "a.csv", (choice & 2) != 0 ? "p" : "", (choice & 1) != 0);
+  const std::string text = textOf(input.rest());
+  const Globe globe;
+  const CurveSet set = (choice & 4) != 0 ? parseGeoJson(text, "a.geojson", globe, {})
+                       : (choice & 8) != 0
+                           ? parseShapefile(text, "a.shp", globe, {})
+                           : parseCurveText(text, "a.csv", (choice & 2) != 0 ? "p" : "",
+                                            (choice & 1) != 0 ? std::optional(globe) : std::nullopt);
   CURVISPLAT_CHECK_OP(set.begins.back(), ==, set.positions.size());
   CURVISPLAT_CHECK(std::ranges::is_sorted(set.begins));
   CURVISPLAT_CHECK(set.values.empty() || set.values.size() == set.positions.size());
+  CURVISPLAT_CHECK(set.times.empty() || set.times.size() == set.positions.size());
+  if (!set.times.empty()) partBetween(set, 1, 2);
   for (const glm::vec3& point : set.positions)
     CURVISPLAT_CHECK(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z));
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <string>
 
 #include "render/mesh/curve_set.h"
@@ -178,7 +179,8 @@ TEST(TriangleMesh, SmoothsWhatIsCurved) {
 }
 
 CurveSet curves(const std::string& text, const std::string& scalar = "", bool as_points = false) {
-  return parseCurveText(text, "a.csv", scalar, as_points);
+  const CurveSet set = parseCurveText(text, "a.csv", scalar);
+  return as_points ? pointsOf(set) : set;
 }
 std::string refusalOfCurves(const std::string& text, const std::string& scalar = "") {
   return curvisplat::errorOf([&] { curves(text, scalar); });
@@ -213,12 +215,135 @@ TEST(CurveText, RefusesWhatItCannotRead) {
             "a.csv: line 2: found 'fast' for speed; expected a number");
   EXPECT_EQ(refusalOfCurves(head + "1,2,3,4", "sped"),
             "a.csv: line 1: has no column 'sped' (did you mean speed?); it has speed");
-  EXPECT_EQ(refusalOfCurves("lon,lat\n1,2"),
-            "a.csv: line 1: has no columns x, y and z among lon, lat; name them so");
+  EXPECT_EQ(
+      refusalOfCurves("lon,lat\n1,2"),
+      "a.csv: has longitudes and latitudes, but the cache does not say where its grid has them; --globe "
+      "RADIUS,VERTICAL_SCALE says that it lies on a sphere around 0,0,0");
+  EXPECT_EQ(refusalOfCurves("x,y,lat\n1,2,3"),
+            "a.csv: line 1: has no columns x, y and z, nor lon and lat, among x, y, lat; name them so");
+  EXPECT_EQ(refusalOfCurves("x,y,z,time\n1,2,3,5\n1,2,3,4"),
+            "a.csv: line 3: found the time 4 after 5; expected times that do not decrease along a line");
   EXPECT_EQ(refusalOfCurves("1,2,3,4", "speed"),
             "a.csv: line 1: has no names of its columns; a first line such as x,y,z,speed names them");
   EXPECT_EQ(refusalOfCurves(head), "a.csv: has no points; expected lines of x,y,z");
   EXPECT_EQ(refusalOfCurves("1,2"), "a.csv: line 1: has 2 columns; expected x, y and z");
+}
+
+glm::dvec3 pointOf(const CurveSet& set, size_t n) {
+  return set.origin + glm::dvec3(set.positions.at(n));
+}
+
+TEST(CurveText, DegreesArePlacedOnTheGlobe) {
+  Globe globe;
+  globe.radius_km = 1000;
+  globe.vertical_scale = 50;
+  const CurveSet set = parseCurveText("Depth,lat,lon\n0,0,0\n2000,0,90\n0,90,0\n", "a.csv", "Depth", globe);
+  EXPECT_NEAR(glm::distance(pointOf(set, 0), glm::dvec3(1000, 0, 0)), 0, 1e-4);
+  EXPECT_NEAR(glm::distance(pointOf(set, 1), glm::dvec3(0, 900, 0)), 0, 1e-4);
+  EXPECT_NEAR(glm::distance(pointOf(set, 2), glm::dvec3(0, 0, 1000)), 0, 1e-4);
+  EXPECT_EQ(set.values[1], 2000);
+  EXPECT_EQ(curvisplat::errorOf([&] { parseCurveText("lon,lat\n1,92", "a.csv", "", globe); }),
+            "a.csv: line 2: found longitude 1 and latitude 92; expected degrees");
+}
+
+TEST(CurveSet, ATimeShowsThePartBeforeIt) {
+  const CurveSet set = curves(
+      "x,y,z,time,speed,id\n0,0,0,0,1,a\n4,0,0,2,3,a\n4,8,0,6,5,a\n9,9,9,5,1,b\n9,9,10,7,1,b\n", "speed");
+  ASSERT_EQ(set.times.size(), 5u);
+  const auto expectPart = [&](const CurveSet& part, const std::vector<glm::vec3>& points,
+                              const std::vector<uint32_t>& begins) {
+    EXPECT_EQ(part.begins, begins);
+    ASSERT_EQ(part.positions.size(), points.size());
+    for (size_t n = 0; n < points.size(); ++n) EXPECT_EQ(pointOf(part, n), glm::dvec3(points[n])) << n;
+  };
+  constexpr double kBefore = -std::numeric_limits<double>::infinity();
+  const CurveSet early = partBetween(set, kBefore, 3);
+  expectPart(early, {{0, 0, 0}, {4, 0, 0}, {4, 2, 0}}, {0, 3});
+  EXPECT_EQ(early.values, (std::vector<float>{1, 3, 3.5f}));
+  EXPECT_EQ(early.times.back(), 3);
+  expectPart(partBetween(set, 1, 3), {{2, 0, 0}, {4, 0, 0}, {4, 2, 0}}, {0, 3});
+  expectPart(partBetween(set, 2.5, 3), {{4, 1, 0}, {4, 2, 0}}, {0, 2});
+  expectPart(partBetween(set, kBefore, 9), {{0, 0, 0}, {4, 0, 0}, {4, 8, 0}, {9, 9, 9}, {9, 9, 10}},
+             {0, 3, 5});
+  expectPart(partBetween(set, kBefore, -1), {}, {0});
+  expectPart(placesAt(set, 0), {{0, 0, 0}}, {0, 1});
+  expectPart(placesAt(set, 5), {{4, 6, 0}, {9, 9, 9}}, {0, 1, 2});
+  expectPart(placesAt(set, 6.5), {{9, 9, 9.75f}}, {0, 1});
+  expectPart(placesAt(set, 8), {}, {0});
+}
+
+const Globe kUnit{Globe::Shape::kSphere, 1, 1, 0};
+
+TEST(MapLines, GeoJsonHasLinesEdgesAndPoints) {
+  const std::string text =
+      R"({"type": "FeatureCollection", "features": [
+      {"type": "Feature", "properties": null, "geometry": {"type": "LineString", "coordinates": [[0, 0], [1, 0, 0]]}},
+      {"type": "Feature", "geometry": null},
+      {"type": "Feature", "geometry": {"type": "GeometryCollection", "geometries": [
+        {"type": "MultiPolygon", "coordinates": [[[[90, 0], [90, 0.5], [90, 0]]]]}, {"type": "Point", "coordinates": [0, 90]}]}}]})";
+  const CurveSet set = parseGeoJson(text, "a.geojson", kUnit, {});
+  EXPECT_EQ(set.begins, (std::vector<uint32_t>{0, 3, 6, 7})) << "a piece has half a degree at most";
+  EXPECT_NEAR(glm::distance(pointOf(set, 1), kUnit.column(0.5, 0)), 0, 1e-6);
+  EXPECT_NEAR(glm::distance(pointOf(set, 3), glm::dvec3(0, 1, 0)), 0, 1e-6);
+  EXPECT_NEAR(glm::distance(pointOf(set, 6), glm::dvec3(0, 0, 1)), 0, 1e-6);
+  // Around the data alone, whatever turn of the Earth its longitudes count from.
+  for (const double turn : {0.0, 360.0, -360.0}) {
+    const CurveSet near = parseGeoJson(text, "a.geojson", kUnit, {{0.25 + turn, -1}, {89 + turn, 1}});
+    EXPECT_EQ(near.begins, (std::vector<uint32_t>{0, 2})) << turn;
+  }
+  // A flat map is cut where its longitudes begin again.
+  Globe flat = kUnit;
+  flat.shape = Globe::Shape::kFlat;
+  const CurveSet cut = parseGeoJson(
+      R"({"type": "MultiLineString", "coordinates": [[[179.9, 3], [180.3, 3]]]})", "a.geojson", flat, {});
+  EXPECT_EQ(cut.begins, (std::vector<uint32_t>{0, 1, 2}));
+
+  const auto refusal = [](const std::string& json) {
+    return curvisplat::errorOf([&] { parseGeoJson(json, "a.geojson", kUnit, {}); });
+  };
+  expectSays(refusal(R"({"type": "Circle"})"),
+             "a.geojson: type is invalid (found \"Circle\", expected a type of GeoJSON)");
+  expectSays(refusal(R"({"type": "Point", "coordinates": [1]})"), "expected a longitude and a latitude");
+  expectSays(refusal(R"({"type": "Point", "coordinates": [1, 5000000]})"), "expected degrees");
+  expectSays(refusal(R"({"type": "FeatureCollection", "features": []})"), "has no lines, polygons or points");
+  expectSays(refusal("{"), "a.geojson: ");
+}
+
+std::string shapefile(uint32_t type) {
+  std::string bytes;
+  append(bytes, uint32_t{9994}, true);
+  bytes.resize(100);
+  const auto addRecord = [&](const std::string& contents) {
+    append(bytes, uint32_t{1}, true);
+    append(bytes, static_cast<uint32_t>(contents.size() / 2), true);
+    bytes += contents;
+  };
+  std::string null, shape;
+  append(null, uint32_t{0});
+  append(shape, type);
+  shape.resize(36);
+  for (const uint32_t number : {2u, 4u, 0u, 2u}) append(shape, number);
+  for (const double degrees : {0.0, 0.0, 0.0, 0.25, 10.0, 20.0, 10.25, 20.0}) append(shape, degrees);
+  addRecord(null);
+  addRecord(shape);
+  return bytes;
+}
+
+TEST(MapLines, ShapefilesHavePartsOfLines) {
+  const CurveSet set = parseShapefile(shapefile(3), "a.shp", kUnit, {});
+  EXPECT_EQ(set.begins, (std::vector<uint32_t>{0, 2, 4}));
+  EXPECT_NEAR(glm::distance(pointOf(set, 3), kUnit.column(10.25, 20)), 0, 1e-6);
+  EXPECT_EQ(parseShapefile(shapefile(15), "a.shp", kUnit, {}).begins.size(), 3u) << "polygons with heights";
+  const auto refusal = [](const std::string& bytes) {
+    return curvisplat::errorOf([&] { parseShapefile(bytes, "a.shp", kUnit, {}); });
+  };
+  EXPECT_EQ(refusal("PK"), "a.shp: is not a shapefile");
+  EXPECT_EQ(refusal(shapefile(7)), "a.shp: has shapes of type 7; expected lines, polygons or points");
+  std::string whole = shapefile(3);
+  for (size_t size = 100; size < whole.size(); ++size)
+    if (size != 112) expectSays(refusal(whole.substr(0, size)), "a.shp: ");
+  whole[whole.size() - 4 * 16 - 2 * 4 - 4] = 127;  // the number of points
+  EXPECT_EQ(refusal(whole), "a.shp: a shape is longer than its record");
 }
 
 }  // namespace

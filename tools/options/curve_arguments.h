@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "render/surface/surface_scene.h"
+#include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 
@@ -17,18 +18,21 @@ struct CurveArguments {
   std::vector<std::string> lines, points, colours;
   std::string by;  // a scalar of the files
   std::string line_width = "3px", point_size = "6px", opacity = "1";
+  std::optional<std::string> time;
 
   bool given() const { return !lines.empty() || !points.empty(); }
 };
 
-/// Adds --lines, --line-width, --points, --point-size, --lines-by, --lines-colour and --lines-opacity.
+/// Adds --lines, --line-width, --points, --point-size, --lines-by, --lines-colour, --lines-opacity and --lines-time.
 void addCurveOptions(CLI::App& command, CurveArguments& arguments, const std::string& group);
 
 /// Throws UsageError; reads no file.
 void checkCurveArguments(const CurveArguments& arguments);
 
-/// Reads the files, those of lines first. `drawn`: the scalar of the picture's colours, whose function colours a scalar of
-/// the same name; another gets one over its values. Throws Error for a file that cannot be read, or has no such scalar.
-std::vector<Curves> curvesOf(const CurveArguments& arguments, const std::string& drawn);
+/// Reads the files, those of lines first, and places what is in degrees as the cache's grid is. `drawn`: the scalar of the
+/// picture's colours, whose function colours a scalar of the same name; another gets one over its values. Trajectories are
+/// those of the cache's step. Throws Error for a file that cannot be read, or has no such scalar.
+std::vector<Curves> curvesOf(const CurveArguments& arguments, const CacheReader& cache,
+                             const std::optional<Globe>& globe, const std::string& drawn);
 
 }  // namespace curvisplat

@@ -31,13 +31,14 @@ inline constexpr unsigned kDefaultFrames = 90;   // of an orbit or a path
 /// Options that choose cameras, as given; checked and parsed later.
 struct CameraArguments {
   std::optional<std::string> view, position, focal_point, view_up, parallel_scale, view_angle, orbit;
+  std::optional<std::string> look_at, from_height;  // above a globe: placedAbove() makes a position of them
   std::optional<std::string> azimuth, elevation, roll, zoom;  // on top of the others
   std::optional<uint64_t> frames;
   std::filesystem::path path;
 
   /// Whether they place the camera, rather than change the place that is chosen from the data.
   bool place() const {
-    return view || position || focal_point || view_up || parallel_scale || view_angle || moves();
+    return view || position || focal_point || view_up || parallel_scale || view_angle || look_at || moves();
   }
   bool turn() const { return azimuth || elevation || roll; }
   bool moves() const { return orbit || !path.empty(); }

@@ -13,9 +13,11 @@
 
 #include "preprocess/formats/vtk/vtk_surface.h"
 #include "render/mesh/triangle_mesh.h"
+#include "render/surface/curve_meshes.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
+#include "tools/options/globe_arguments.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"
 
@@ -178,6 +180,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->capture_default_str()
       ->group(group);
   addCurveOptions(command, arguments.curves, group);
+  addGlobeOption(command, arguments.globe, group);
 }
 
 void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities) {
@@ -244,10 +247,10 @@ std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheR
 
 std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
                                             const std::shared_ptr<const SurfaceScene>& first) {
-  if (!first || first->grid_surfaces.empty()) return first;
+  if (!first || first->grid_surfaces.empty()) return sceneAtTime(first, cache.time());
   auto scene = std::make_shared<SurfaceScene>(*first);
   scene->grid_surfaces = facesAt(arguments, cache, first->grid_surfaces);
-  return scene;
+  return sceneAtTime(std::move(scene), cache.time());
 }
 
 std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
@@ -284,8 +287,8 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   scene->iso_opacity = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   scene->iso_of_colours = scalars.iso_of_colours;
   scene->volume = arguments.volume == "on";
-  scene->curves =
-      curvesOf(arguments.curves, scalars.colours ? cache.manifest().variables[*scalars.colours].name : "");
+  scene->curves = curvesOf(arguments.curves, cache, globeOf(arguments.globe, cache.manifest()),
+                           scalars.colours ? cache.manifest().variables[*scalars.colours].name : "");
   requireIsovalues(*scene, cache, scalars);
   return scene;
 }
@@ -321,7 +324,9 @@ void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, con
   command.add_flag("--axes", arguments.shown.axes, "Draw the directions of x, y and z")->group(group);
   command
       .add_flag("--axes-grid", arguments.shown.axes_grid,
-                "Draw a grid behind the data, with coordinates (before --scale) along its edges")
+                "Draw a grid behind the data, with coordinates (before --scale) along its edges; of data on "
+                "a globe "
+                "longitude, latitude and depth or height")
       ->group(group);
   command
       .add_option(
@@ -350,6 +355,13 @@ void checkAnnotationArguments(const AnnotationArguments& arguments) {
 void AnnotationArguments::fill(const TextFields& fields, AnnotatedScene& scene) const {
   if (title) scene.title = filledText("--title", *title, fields);
   if (label) scene.label = filledText("--label", *label, fields);
+}
+
+void AnnotationArguments::put(const std::optional<AnnotatedScene::OnGlobe>& box,
+                              AnnotatedScene& scene) const {
+  scene.on_globe = box;
+  if (!box || axis_titles) return;
+  scene.axis_titles = {"longitude", "latitude", box->isOfDepths() ? "depth [m]" : "height [m]"};
 }
 
 std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments) {

@@ -37,6 +37,7 @@ struct SurfaceArguments {
   std::vector<std::string> isovalues;
   std::string iso_opacity = "1";
   CurveArguments curves;
+  std::optional<std::string> globe;  // on which the cache's grid lies (globe_arguments.h)
 
   bool given() const {
     return !surfaces.empty() || !slices.empty() || !isovalues.empty() || curves.given() || volume != "on";
@@ -79,7 +80,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
 /// colours of `first`. Throws Error as sceneOf().
 std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheReader& cache,
                                  const std::vector<GridSurface>& first);
-/// The scene with the faces of facesAt(); null if `first` is null.
+/// The scene with the faces of facesAt(), and the curves of that time; null if `first` is null.
 std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
                                             const std::shared_ptr<const SurfaceScene>& first);
 
@@ -99,6 +100,8 @@ struct AnnotationArguments {
     shown.axes_grid |= axis_titles.has_value();
     shown.texts = title || label;
   }
+  /// Gives the axes grid the longitudes, latitudes and heights of `box`, if it is given, and their titles.
+  void put(const std::optional<AnnotatedScene::OnGlobe>& box, AnnotatedScene& scene) const;
   /// The scene's texts, with their fields filled in.
   void fill(const TextFields& fields, AnnotatedScene& scene) const;
 };

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/frame/frame.h"
+#include "render/surface/curve_meshes.h"
 #include "stream/base/progress.h"
 #include "stream/base/threads.h"
 
@@ -73,10 +74,11 @@ struct FrameLoop::Drawing {
   void takeFaces(const CacheReader& cache, FrameRequest& request);
 };
 
-/// The request's faces at its step. The same ones as for the last request, where they can be: their meshes
+/// The request's faces at its step, and its curves at its time. The same ones as for the last request, where they can be: their meshes
 /// are kept.
 void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& request) {
   const auto& scene = request.options.scene;
+  request.options.scene = sceneAtTime(scene, cache.series().timeAt({request.step, request.part}));
   if (!request.faces_at || !scene || scene->grid_surfaces.empty()) return;
   const bool change_with_steps =
       cache.series().geometries() > 1 || !request.faces.by.empty() || !request.faces.opacity_by.empty();
