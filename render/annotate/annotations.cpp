@@ -209,20 +209,6 @@ void drawScalarBars(cairo_t* cairo, ImageSize picture, std::span<const ShownFunc
 
 // --------------------------------------------------------------------------------------- title, label
 
-/// Draws text from `at`, the left end of its baseline; on a rim of the other ink, since it lies over the
-/// data.
-void drawOverData(cairo_t* cairo, const glm::dvec2& at, const std::string& text, double font,
-                  const glm::dvec3& ink) {
-  cairo_move_to(cairo, at.x, at.y);
-  cairo_text_path(cairo, text.c_str());
-  cairo_set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
-  cairo_set_line_width(cairo, font / 4);
-  setInk(cairo, 1.0 - ink, 0.7);
-  cairo_stroke_preserve(cairo);
-  setInk(cairo, ink);
-  cairo_fill(cairo);
-}
-
 void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
   constexpr double kTitle = 1.4;  // of the font's size
   const double font = fontSize(scene.picture), width = scene.view.size.width, room = width - 2 * font;

@@ -20,7 +20,6 @@ namespace {
 constexpr double kEdgeOn = 0.02;
 constexpr double kTick = 0.4, kGap = 0.35;  // in units of the font's size
 constexpr double kLabelSpace = 4.5;         // between ticks, in the same
-constexpr double kShortest = 3;             // edge with coordinates
 constexpr int kMinTicks = 3, kMaxTicks = 8;
 
 using Line = std::pair<glm::dvec2, glm::dvec2>;
@@ -129,14 +128,32 @@ void addSide(cairo_t* cairo, const AnnotatedScene& scene, const Box& box, int ax
 void drawLabels(cairo_t* cairo, const AnnotatedScene& scene, const Box& box, int axis) {
   const std::optional<Edge> edge = box.labelled(axis);
   const std::optional<Line> line = edge ? box.lineOf(*edge) : std::nullopt;
+  if (!line) return;
+  LabelledEdge labelled{line->first,
+                        0.5 * (line->first + line->second),
+                        line->second,
+                        {},
+                        scene.axis_titles[static_cast<size_t>(axis)]};
+  for (const AxisTick& tick : box.ticks(axis)) {
+    glm::dvec3 at = edge->from;
+    at[axis] = tick.value;
+    if (const auto point = box.lineOf(at, at)) labelled.ticks.emplace_back(point->first, tick.label);
+  }
+  drawEdgeLabels(cairo, scene, labelled,
+                 scene.view.pixelFromView(scene.view.viewFromData(0.5 * (scene.lower + scene.upper))));
+  add(cairo, line);
+  cairo_stroke(cairo);
+}
+
+}  // namespace
+
+void drawEdgeLabels(cairo_t* cairo, const AnnotatedScene& scene, const LabelledEdge& edge,
+                    const glm::dvec2& centre) {
   const double font = fontSize(scene.view.size);
-  if (!line || !(glm::distance(line->first, line->second) > kShortest * font)) return;
-  const glm::dvec2 along = glm::normalize(line->second - line->first);
+  if (!(glm::distance(edge.from, edge.to) > edge.shortest * font)) return;
+  const glm::dvec2 along = glm::normalize(edge.to - edge.from);
   glm::dvec2 outward(-along.y, along.x);
-  const glm::dvec2 centre =
-      scene.view.pixelFromView(scene.view.viewFromData(0.5 * (scene.lower + scene.upper)));
-  const glm::dvec2 middle = 0.5 * (line->first + line->second);
-  if (glm::dot(outward, middle - centre) < 0) outward = -outward;
+  if (glm::dot(outward, edge.middle - centre) < 0) outward = -outward;
   // Text that would be cut off at the picture's edge is moved into it, and made smaller if it is too long.
   const auto drawInside = [&](glm::dvec2 at, const std::string& text) {
     const glm::dvec2 image(scene.view.size.width, scene.view.size.height);
@@ -159,30 +176,27 @@ void drawLabels(cairo_t* cairo, const AnnotatedScene& scene, const Box& box, int
     return std::abs(outward.x) * size.x + std::abs(outward.y) * size.y;
   };
   cairo_set_line_width(cairo, std::max(1.0, font / 12));
-  add(cairo, line);
   double deepest = 0;
-  for (const AxisTick& tick : box.ticks(axis)) {
-    glm::dvec3 at = edge->from;
-    at[axis] = tick.value;
-    const auto point = box.lineOf(at, at);
-    if (!point) continue;
-    const glm::dvec2 end = point->first + kTick * font * outward;
-    add(cairo, Line(point->first, end));
-    const glm::dvec2 size = extents(tick.label);
+  std::optional<std::pair<glm::dvec2, glm::dvec2>> last;  // a label's place and size
+  for (const auto& [point, label] : edge.ticks) {
+    const glm::dvec2 end = point + kTick * font * outward;
+    const glm::dvec2 needed = last ? 0.5 * (last->second + extents(label)) + 0.2 * font : glm::dvec2(0.0);
+    if (last && std::abs(point.x - last->first.x) < needed.x && std::abs(point.y - last->first.y) < needed.y)
+      continue;
+    last = {point, extents(label)};
+    add(cairo, Line(point, end));
+    const glm::dvec2 size = extents(label);
     deepest = std::max(deepest, depth(size));
     cairo_stroke(cairo);
-    drawInside(end + (kGap * font + 0.5 * depth(size)) * outward, tick.label);
+    drawInside(end + (kGap * font + 0.5 * depth(size)) * outward, label);
   }
-  cairo_stroke(cairo);
-  const std::string& title = scene.axis_titles[static_cast<size_t>(axis)];
-  if (title.empty()) return;
-  const double away = (kTick + 3 * kGap) * font + deepest + 0.5 * depth(extents(title));
-  drawInside(middle + away * outward, title);
+  if (edge.title.empty()) return;
+  const double away = (kTick + 3 * kGap) * font + deepest + 0.5 * depth(extents(edge.title));
+  drawInside(edge.middle + away * outward, edge.title);
 }
 
-}  // namespace
-
 void drawAxesGrid(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+  if (scene.on_globe) return drawGlobeGrid(cairo, scene, ink);
   const Box box(scene);
   cairo_set_line_width(cairo, std::max(1.0, fontSize(scene.view.size) / 14));
   for (int axis = 0; axis < 3; ++axis)
@@ -203,6 +217,7 @@ void drawAxesGrid(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3&
 }
 
 void drawAxesLabels(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+  if (scene.on_globe) return drawGlobeLabels(cairo, scene, ink);
   const Box box(scene);
   setInk(cairo, ink);
   for (int axis = 0; axis < 3; ++axis) drawLabels(cairo, scene, box, axis);

@@ -129,6 +129,20 @@ inline void drawText(cairo_t* cairo, const glm::dvec2& centre, const std::string
   cairo_show_text(cairo, text.c_str());
 }
 
+/// Draws text from `at`, the left end of its baseline; on a rim of the other ink, since it lies over the
+/// data.
+inline void drawOverData(cairo_t* cairo, const glm::dvec2& at, const std::string& text, double font,
+                         const glm::dvec3& ink) {
+  cairo_move_to(cairo, at.x, at.y);
+  cairo_text_path(cairo, text.c_str());
+  cairo_set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
+  cairo_set_line_width(cairo, font / 4);
+  setInk(cairo, 1.0 - ink, 0.7);
+  cairo_stroke_preserve(cairo);
+  setInk(cairo, ink);
+  cairo_fill(cairo);
+}
+
 /// The projection of the part of a line that is in front of the near plane; nullopt if none is.
 inline std::optional<std::pair<glm::dvec2, glm::dvec2>> lineInImage(const ScreenView& view, glm::dvec3 a,
                                                                     glm::dvec3 b) {

@@ -93,6 +93,10 @@ class Pictures(PythonTest):
                                           lines_opacity=0.5, title="{scalar} {step}", label="t = {time:.1f}"),
                              "--lines", lines, "--points", lines, "--lines-by", "speed", "--line-width", 0.1, "--point-size", "9px",
                              "--lines-opacity", 0.5, "--title", "{scalar} {step}", "--label", "t = {time:.1f}")
+            lines.write_text("lon,lat,time\n0,10,0\n60,20,3\n")
+            self.expect_same(cache.render(size=size, lines=lines, lines_time=2.5, globe=(5, 2), look_at=(10, 20.5), from_height=8, axes_grid=True),
+                             "--lines", lines, "--lines-time", 2.5, "--globe", "5,2", "--look-at", "10,20.5", "--from-height", 8,
+                             "--axes-grid")
             self.expect_same(cache.render(size=size, camera=curvisplat.Camera((20, -9, 8)), zoom=2), "--position", "20,-9,8",
                              "--focal-point", "0,0,0", "--zoom", 2)
             self.expect_same(

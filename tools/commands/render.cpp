@@ -9,10 +9,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
 #include "render/image/image_file.h"
+#include "render/surface/curve_meshes.h"
 #include "stream/base/error.h"
 #include "stream/base/memory.h"
 #include "stream/base/progress.h"
@@ -24,6 +26,7 @@
 #include "tools/commands/render_statistics.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_sequence.h"
+#include "tools/options/globe_arguments.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/opacity_arguments.h"
 #include "tools/options/option_parsers.h"
@@ -185,9 +188,14 @@ void render(const RenderArguments& given) {
   const bool has_grid = arguments.annotations.shown.axes_grid;
   const bool has_box = has_grid || arguments.annotations.shown.outline;
   const Series series = cache.series();
-  const ShownBox box = shownBox(manifest, options.scale, options.clip_box, arguments.annotations.shown);
-  const CameraArguments camera = choice.picture.camera(
-      arguments.camera, transfer_function, {box, options.size, has_box || options.clip_box.has_value()});
+  const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
+  const auto box_on_globe = has_grid ? boxOnGlobe(cache, globe) : std::nullopt;
+  const ShownBox box =
+      withGrid(shownBox(manifest, options.scale, options.clip_box, arguments.annotations.shown), box_on_globe,
+               options.scale);
+  const CameraArguments camera =
+      choice.picture.camera(placedAbove(arguments.camera, globe, options.scale), transfer_function,
+                            {box, options.size, has_box || options.clip_box.has_value()});
   choice.picture.release();
   const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), box, options.size), series,
                                      arguments.steps, steps, arguments.camera.frames);
@@ -225,11 +233,15 @@ void render(const RenderArguments& given) {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));
   };
-  const auto step_changed = [&, first = options.scene] {
-    options.scene = sceneAt(arguments.surfaces, cache, first);
+  const auto step_changed = [&, first = options.scene, step = cache.step()]() mutable {
+    // Between two steps the faces stay, and their meshes with them.
+    const bool same_step = std::exchange(step, cache.step()) == cache.step();
+    options.scene =
+        same_step ? sceneAtTime(options.scene, cache.time()) : sceneAt(arguments.surfaces, cache, first);
   };
   try {
-    drawFrames({arguments, manifest, player, output.get(), report, step_changed}, motion, numbers, progress);
+    drawFrames({arguments, manifest, player, output.get(), report, step_changed, box_on_globe}, motion,
+               numbers, progress);
   } catch (const Interrupted& interrupted) {
     progress.end();
     writeReport();
@@ -353,6 +365,7 @@ void addRender(CLI::App& app) {
       ->add_option("--parallel-scale", camera->parallel_scale,
                    "Half the picture's height in world units (default: fits the data)")
       ->group(where);
+  addLookAtOptions(*command, *camera, where);
   command
       ->add_option("--orbit", camera->orbit,
                    "Orbit the focal point by this angle about the up direction, in degrees")

@@ -135,6 +135,7 @@ class FrameRun {
         output_(job.output),
         report_(job.report),
         step_changed_(job.step_changed),
+        box_(job.box),
         progress_(progress),
         ranks_(launchedRanks()),
         channels_(channelsOf(job.arguments)) {}
@@ -212,14 +213,14 @@ class FrameRun {
 
   void goTo(const StepPosition& position) {
     player_.goTo(position);
-    if (step_ == position.step) return;
+    if (position_ == position) return;
     step_changed_();
-    step_ = position.step;
+    position_ = position;
   }
 
   void draw(uint64_t number, const uint64_t* next, const MotionInTime& motion, Progress& progress) {
     goTo(motion.position(number));
-    drawn_step_ = *step_;
+    drawn_step_ = position_->step;
     const double time = player_.time();
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
@@ -307,6 +308,7 @@ class FrameRun {
                          report_.shown,          manifest_.lower,
                          manifest_.upper,        report_.background,
                          axisTitles(annotations)};
+    annotations.put(box_, scene);
     const VariableInfo& shown = report_.colour_variable ? *report_.colour_variable : report_.variable;
     annotations.fill({frame.time, drawn_step_, frame.number, shown.name, shown.unit}, scene);
     write(annotated(std::move(data), annotations.shown, scene));
@@ -330,8 +332,9 @@ class FrameRun {
   FrameOutput* output_;  // null at ranks that write nothing
   RenderReport& report_;
   const std::function<void()> step_changed_;
-  std::optional<uint64_t> step_;  // that the player is at
-  uint64_t drawn_step_ = 0;       // of the frame, while the player goes to the next
+  const std::optional<AnnotatedScene::OnGlobe> box_;
+  std::optional<StepPosition> position_;  // that the player is at
+  uint64_t drawn_step_ = 0;               // of the frame, while the player goes to the next
   Progress& progress_;
   Ranks& ranks_;
   const ValueChannels channels_;

@@ -64,7 +64,8 @@ struct FrameJob {
   StepPlayer& player;
   FrameOutput* output;  // null at ranks that write nothing
   RenderReport& report;
-  std::function<void()> step_changed;  // called when the player is at another step than before
+  std::function<void()> step_changed;          // called when the player is at another time than before
+  std::optional<AnnotatedScene::OnGlobe> box;  // of the axes grid
 };
 
 /// Draws the frames `numbers`. Pictures that were written are kept if a later frame fails. Throws

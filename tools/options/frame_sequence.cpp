@@ -86,6 +86,13 @@ void addCameraOptions(CLI::App& command, CameraArguments& arguments, const std::
 void checkCameraArguments(const CameraArguments& arguments) {
   if (arguments.view && (arguments.position || arguments.view_up))
     throw UsageError("--view cannot be combined with --position or --view-up");
+  if (arguments.look_at.has_value() != arguments.from_height.has_value())
+    throw UsageError("--look-at and --from-height need one another");
+  if (arguments.look_at &&
+      (arguments.view || arguments.position || arguments.focal_point || arguments.view_up))
+    throw UsageError(
+        "--look-at cannot be combined with --view, --position, --focal-point or --view-up; all place the "
+        "camera");
   if (!arguments.position && arguments.view_up) throw UsageError("--view-up needs --position");
   if (!arguments.position && !arguments.view && arguments.focal_point)
     throw UsageError("--focal-point needs --position or --view");
@@ -102,11 +109,11 @@ void checkCameraArguments(const CameraArguments& arguments) {
     throw UsageError(
         "--path {}: its key frames place the camera; remove --azimuth, --elevation, --roll and --zoom",
         arguments.path.string());
-  if (!arguments.path.empty() &&
-      (arguments.view || arguments.position || arguments.parallel_scale || arguments.view_angle))
+  if (!arguments.path.empty() && (arguments.view || arguments.position || arguments.look_at ||
+                                  arguments.parallel_scale || arguments.view_angle))
     throw UsageError(
-        "--path {}: its key frames place the camera; remove --view, --position, --parallel-scale and "
-        "--view-angle",
+        "--path {}: its key frames place the camera; remove --view, --position, --look-at, --parallel-scale "
+        "and --view-angle",
         arguments.path.string());
   if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
 }

@@ -11,6 +11,7 @@
 
 #include "render/annotate/annotations.h"
 #include "stream/base/error.h"
+#include "tools/options/globe_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/output/empty_picture.h"
@@ -72,7 +73,7 @@ FrameArguments frameArguments(const Options& frame, const py::dict& others) {
   return arguments;
 }
 
-SurfaceArguments surfaceArguments(const py::dict& others) {
+SurfaceArguments surfaceArguments(const Options& frame, const py::dict& others) {
   SurfaceArguments arguments;
   arguments.surfaces = of<Texts>(others, "surfaces");
   arguments.colours = of<Texts>(others, "surface_colours");
@@ -91,6 +92,8 @@ SurfaceArguments surfaceArguments(const py::dict& others) {
   curves.line_width = of<std::string>(others, "line_width");
   curves.point_size = of<std::string>(others, "point_size");
   curves.opacity = of<std::string>(others, "lines_opacity");
+  curves.time = given(frame, "lines_time");
+  arguments.globe = given(frame, "globe");
   return arguments;
 }
 
@@ -127,6 +130,8 @@ CameraArguments cameraArguments(const Options& camera) {
   arguments.parallel_scale = given(camera, "parallel_scale");
   arguments.view_angle = given(camera, "view_angle");
   arguments.orbit = given(camera, "orbit");
+  arguments.look_at = given(camera, "look_at");
+  arguments.from_height = given(camera, "from_height");
   arguments.azimuth = given(camera, "azimuth");
   arguments.elevation = given(camera, "elevation");
   arguments.roll = given(camera, "roll");
@@ -140,7 +145,7 @@ PictureArguments pictureArguments(const Options& function, const Options& camera
           opacityArguments(function),
           cameraArguments(camera),
           frameOptions(frameArguments(frame, others)),
-          surfaceArguments(others),
+          surfaceArguments(frame, others),
           annotationArguments(frame, others),
           stepArguments(frame, others),
           valueChannels(given(frame, "channels"), "picture.exr"),
@@ -282,10 +287,13 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);
     frame.size = dataSize(annotations, size, functions);
     if (!(annotations == Annotations{})) frame.output_bytes += annotatedBytes(size, frame.size);
-    const ShownBox box = shownBox(manifest, frame.scale, frame.clip_box, annotations);
+    const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
+    const auto box_on_globe = annotations.axes_grid ? boxOnGlobe(reader_, globe) : std::nullopt;
+    const ShownBox box =
+        withGrid(shownBox(manifest, frame.scale, frame.clip_box, annotations), box_on_globe, frame.scale);
     const bool whole = annotations.outline || annotations.axes_grid || frame.clip_box;
-    const CameraArguments camera =
-        choice.picture.camera(arguments.camera, function, {box, frame.size, whole});
+    const CameraArguments camera = choice.picture.camera(placedAbove(arguments.camera, globe, frame.scale),
+                                                         function, {box, frame.size, whole});
     const Camera at = chooseCameraMotion(camera, box, frame.size).camera(0);
     // The grid of the axes lies behind the data, before the background.
     if (annotations.axes_grid) frame.background = glm::vec4(0);
@@ -311,6 +319,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
                            manifest.upper,
                            arguments.frame.background,
                            axisTitles(arguments.annotations)};
+      arguments.annotations.put(box_on_globe, scene);
       const VariableInfo& of_texts = manifest.variables[shown];
       arguments.annotations.fill({reader_.time(), reader_.step(), 0, of_texts.name, of_texts.unit}, scene);
       image = annotated(std::move(image), annotations, scene);

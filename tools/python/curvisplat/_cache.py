@@ -352,7 +352,8 @@ class Cache:
                axes_titles: Optional[Sequence[str]] = None, outline: bool = False, title: Optional[str] = None,
                label: Optional[str] = None, lines: Union[str, Sequence[str]] = (), points: Union[str, Sequence[str]] = (),
                lines_by: str = "", lines_colour: Union[str, Sequence[str]] = (), line_width: Union[str, float] = "3px",
-               point_size: Union[str, float] = "6px", lines_opacity: float = 1,
+               point_size: Union[str, float] = "6px", lines_opacity: float = 1, lines_time: Union[str, float, None] = None,
+               globe: Optional[Sequence[float]] = None, look_at: Optional[Tuple[float, float]] = None, from_height: Optional[float] = None,
                channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M",
                card_memory: Union[str, int, None] = None, threads: int = 0,
@@ -390,6 +391,11 @@ class Cache:
         lines, points: files, drawn as tubes and spheres of line_width and point_size (a length, or pixels as "3px"), in
         lines_colour or coloured by their scalar lines_by.
 
+        lines_time: of lines with times "past", "all", or how long before the time of the picture they begin. globe: (radius,
+        vertical scale) of the sphere of a cache that does not have them.
+
+        look_at: (longitude, latitude), from_height: kilometres; a camera above that place.
+
         isovalues: of the scalar, or of iso_by. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
         function.
 
@@ -413,7 +419,7 @@ class Cache:
         of_function = _instead(function, "function", colours=colours, range=range, opacity=opacity, asinh=asinh,
                                opacity_unit=opacity_unit)
         of_camera = _instead(camera, "camera", view=view, position=position, focal_point=focal_point, view_up=view_up,
-                             parallel_scale=parallel_scale, view_angle=view_angle)
+                             parallel_scale=parallel_scale, view_angle=view_angle, look_at=look_at, from_height=from_height)
         of_camera |= {name: value for name, value in (("azimuth", azimuth), ("elevation", elevation), ("roll", roll), ("zoom", zoom))
                       if value is not None}
         of_two = _given(opacity_by=opacity_by or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh,
@@ -424,6 +430,7 @@ class Cache:
                        gradient_opacity=None if gradient_opacity is None else _opacities(gradient_opacity),
                        max_splats=None if max_splats is None else str(max_splats),
                        channels=",".join(_arguments.several(channels)) or "none",
+                       lines_time=None if lines_time is None else _text(lines_time), globe=globe,
                        axes_titles=None if axes_titles is None else ",".join(axes_titles), title=title, label=label)
         others = {"clip_planes": _arguments.planes("clip_planes", clip_planes, _numbers),
                   "step": None if step is None else _arguments.whole("step", step),

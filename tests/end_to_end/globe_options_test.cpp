@@ -1,0 +1,229 @@
+// Lines, cameras and coordinates in longitude, latitude and height, of caches of NetCDF grids and others.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <string>
+
+#include "render/image/image.h"
+#include "stream/cache/manifest.h"
+#include "stream/cache/series.h"
+#include "stream/model/globe.h"
+#include "tests/support/netcdf_writer.h"
+#include "tests/support/program_test.h"
+
+namespace curvisplat {
+namespace {
+
+using Index = std::vector<size_t>;
+constexpr auto kDouble = NetcdfNumbers::kDoublePrecision;
+constexpr Globe kGlobe{Globe::Shape::kSphere, 6371, 20, 0};
+
+/// A sea of 20 x 16 degrees, 4 km deep, at three times, six hours apart; in each of two caches.
+class GlobeOptions : public ProgramSuite<GlobeOptions> {
+ protected:
+  static void prepare() {
+    writeSea(*folder_ / "sea.nc");
+    const Words all{"--steps", "all", "--vertical-scale", "20"};
+    run(Words{"convert", file("sea.nc"), "-o", file("sea.splats")} + all);
+    run(Words{"convert", file("sea.nc"), "-o", file("flat.splats"), "--flat"} + all);
+    writeDrift(*folder_ / "drift.nc", "hours since 2001-01-01");
+  }
+
+  static void writeSea(const std::filesystem::path& path) {
+    NetcdfWriter file(path, NetcdfFileType::kClassic);
+    for (const auto& [name, length] : {std::pair("time", 3), {"depth", 5}, {"lat", 17}, {"lon", 21}})
+      file.dimension(name, static_cast<size_t>(length));
+    file.variable("time", kDouble, {"time"}, {{"units", "days since 2001-01-01"}},
+                  [](const Index& n) { return 0.25 * static_cast<double>(n[0]); });
+    file.variable("depth", kDouble, {"depth"}, {{"units", "m"}, {"positive", "down"}},
+                  [](const Index& n) { return 1000.0 * static_cast<double>(n[0]); });
+    file.variable("lat", kDouble, {"lat"}, {{"units", "degrees_north"}},
+                  [](const Index& n) { return 40.0 + static_cast<double>(n[0]); });
+    file.variable("lon", kDouble, {"lon"}, {{"units", "degrees_east"}},
+                  [](const Index& n) { return static_cast<double>(n[0]) - 5.0; });
+    file.variable("temp", kDouble, {"time", "depth", "lat", "lon"}, {},
+                  [](const Index& n) { return static_cast<double>(n[0] + n[1] * n[1] + n[2] + 2 * n[3]); });
+  }
+
+  /// A float that goes east by a degree in an hour, at 500 m, for twelve hours; and one that stays for three.
+  static void writeDrift(const std::filesystem::path& path, const std::string& unit) {
+    NetcdfWriter file(path, NetcdfFileType::kNetcdf4);
+    file.dimension("trajectory", 2);
+    file.dimension("obs", 13);
+    const std::vector<std::string> dims{"trajectory", "obs"};
+    const auto there = [](const NetcdfFunction& value) {
+      return [value](const Index& n) { return n[0] == 1 && n[1] > 3 ? -999.0 : value(n); };
+    };
+    const NetcdfDoubleList fill{{-999.0}};
+    file.variable("time", kDouble, dims, {{"units", unit}, {"_FillValue", fill}},
+                  there([](const Index& n) { return static_cast<double>(n[1]); }));
+    file.variable("lon", kDouble, dims, {{"units", "degrees_east"}, {"_FillValue", fill}},
+                  there([](const Index& n) { return n[0] == 1 ? 12.0 : static_cast<double>(n[1]); }));
+    file.variable("lat", kDouble, dims, {{"units", "degrees_north"}, {"_FillValue", fill}},
+                  there([](const Index& n) { return n[0] == 1 ? 53.0 : 45.0; }));
+    file.variable("z", kDouble, dims, {{"units", "m"}, {"positive", "down"}, {"_FillValue", fill}},
+                  there([](const Index& n) { return n[0] == 1 ? 10.0 * static_cast<double>(n[1]) : 500.0; }));
+  }
+
+  static Image picture(const Words& more, const std::string& cache = "sea") {
+    return pictureOf(file(cache + ".splats"), file("a.pfm"),
+                     Words{"--volume", "off", "--look-at", "5,48", "--from-height", "4000"} + more,
+                     "160x120");
+  }
+  static constexpr double kSame = 50;
+  /// Expects the same picture but for rounding.
+  static void expectSame(const Image& a, const Image& b, double psnr_db = kSame) {
+    EXPECT_GT(compareImages(a, b).psnr_db, psnr_db);
+  }
+  static std::string csv(const std::string& name, const std::string& text) {
+    writeFileAtomically(file(name), text);
+    return file(name);
+  }
+};
+
+TEST_F(GlobeOptions, TheCacheKeepsItsGlobe) {
+  EXPECT_EQ(readManifest(file("sea.splats")).globe, kGlobe);
+  const auto flat = readManifest(file("flat.splats")).globe;
+  ASSERT_TRUE(flat.has_value());
+  EXPECT_EQ(flat->shape, Globe::Shape::kFlat);
+  EXPECT_EQ(flat->middle_longitude, 5);
+  EXPECT_EQ(flat->vertical_scale, 20);
+}
+
+TEST_F(GlobeOptions, LinesLieWhereTheGridIs) {
+  for (const std::string cache : {"sea", "flat"}) {
+    const Globe globe = *readManifest(file(cache + ".splats")).globe;
+    std::string world = "x,y,z,id\n";
+    for (const auto& [line, places] : {std::pair(0, 13), {1, 4}})
+      for (int n = 0; n < places; ++n) {
+        const glm::dvec3 at =
+            globe.placeAt(line == 0 ? glm::dvec3(n, 45, -0.5) : glm::dvec3(12, 53, -0.01 * n));
+        world += fmt::format("{},{},{},{}\n", at.x, at.y, at.z, line);
+      }
+    const Image expected = picture({"--lines", csv("world.csv", world), "--lines-time", "all"}, cache);
+    EXPECT_EQ(picture({"--lines", file("drift.nc"), "--lines-time", "all"}, cache).rgba, expected.rgba);
+    EXPECT_NE(picture({"--lines", file("drift.nc")}, cache).rgba, expected.rgba);
+  }
+  // Degrees in a cache that has none need --globe, which says the same here.
+  run({"generate", "globe", "--size", "8x8x4", "-o", file("shell")});
+  run({"convert", file("shell.xyz"), file("shell.fun"), "-o", file("shell.splats")});
+  expectRefused({"render", file("shell.splats"), "-o", file("a.png"), "--lines", file("drift.nc")}, 1,
+                {"drift.nc: has longitudes and latitudes, but the cache does not say where its grid has "
+                 "them; --globe "});
+  run({"render", file("shell.splats"), "-o", file("a.png"), "--lines", file("drift.nc"), "--globe", "1,20"});
+}
+
+TEST_F(GlobeOptions, TrajectoriesFollowTheTimeOfThePicture) {
+  const std::string east = csv("east.csv",
+                               "lon,lat,depth\n0,45,500\n1,45,500\n2,45,500\n3,45,500\n"
+                               "4,45,500\n5,45,500\n6,45,500\n\n12,53,0\n12,53,10\n12,53,20\n12,53,30\n");
+  // The second step is six hours after the first.
+  expectSame(picture({"--lines", file("drift.nc"), "--step", "1"}), picture({"--lines", east}));
+  const Image at_six = picture({"--points", csv("one.csv", "lon,lat,depth\n6,45,500\n")});
+  expectSame(picture({"--points", file("drift.nc"), "--step", "1"}), at_six);
+  // The last two hours, in the unit of the series: days.
+  expectSame(picture({"--lines", file("drift.nc"), "--step", "1", "--lines-time", "0.08333333333333333"}),
+             picture({"--lines", csv("tail.csv", "lon,lat,depth\n4,45,500\n5,45,500\n6,45,500\n")}));
+  // Between two steps, and of a series of pictures.
+  const Image half = picture({"--points", file("drift.nc"), "--time", "0.375", "--interpolate"});
+  expectSame(half, picture({"--points", csv("half.csv", "lon,lat,depth\n9,45,500\n")}));
+  run(Words{"render", file("sea.splats"), "-o", file("f%d.pfm"), "--size", "160x120", "--volume", "off",
+            "--look-at", "5,48", "--from-height", "4000", "--points", file("drift.nc"), "--steps", "all",
+            "--interpolate", "--frames", "5"});
+  expectSame(readImage(file("f3.pfm")), half);
+  expectSame(readImage(file("f2.pfm")), at_six);
+  EXPECT_LT(compareImages(readImage(file("f0.pfm")), half).psnr_db, kSame);
+  // Text has times of the series' unit.
+  const std::string timed = csv("timed.csv", "lon,lat,depth,time\n5,45,500,0\n7,45,500,0.5\n");
+  expectSame(picture({"--points", timed, "--step", "1"}), at_six, 35);  // on the chord between two places
+  // Times that do not compare.
+  writeDrift(*folder_ / "steps.nc", "1");
+  const ProgramResult whole =
+      run({"render", file("sea.splats"), "-o", file("a.png"), "--lines", file("steps.nc")});
+  expectSays(
+      whole.err,
+      "steps.nc: its times, in '1', do not compare with those of the cache, in 'days since 2001-01-01'");
+  expectRefused({"render", file("sea.splats"), "-o", file("a.png"), "--lines", file("steps.nc"),
+                 "--lines-time", "past"},
+                1, {"steps.nc: its times, in '1', do not compare"});
+  for (const char* const wrong : {"0", "-1", "later"})
+    expectRefused({"render", file("sea.splats"), "-o", file("a.png"), "--lines", east,
+                   fmt::format("--lines-time={}", wrong)},
+                  2, {"--lines-time"});
+  expectRefused({"render", file("sea.splats"), "-o", file("a.png"), "--lines-time", "all"}, 2,
+                {"--lines-time needs lines or points: --lines FILE"});
+}
+
+TEST_F(GlobeOptions, MapsAreDrawnAroundTheData) {
+  const auto map = [](double west) {
+    return fmt::format(R"({{"type": "LineString", "coordinates": [[{0}, 50], [{1}, 50]]}})", west,
+                       west + 0.5);
+  };
+  const std::string near = csv("near.geojson", map(5)), far = csv("far.geojson", map(120));
+  expectSame(picture({"--lines", near}), picture({"--lines", csv("near.csv", "lon,lat\n5,50\n5.5,50\n")}));
+  const Image none = picture({"--lines", far});
+  for (size_t n = 0; n < none.rgba.size(); ++n) ASSERT_EQ(none.rgba[n], none.rgba[n % 4]);
+  expectRefused({"render", file("sea.splats"), "-o", file("a.png"), "--lines", near, "--lines-by", "speed"},
+                1, {"--lines-by speed: the files have no scalars; leave it out"});
+  EXPECT_NE(picture({"--lines", near, "--lines", file("drift.nc"), "--lines-by", "lat"}).rgba,
+            picture({"--lines", near, "--lines", file("drift.nc")}).rgba);
+}
+
+TEST_F(GlobeOptions, ACameraLooksDownAtAPlace) {
+  const glm::dvec3 column = kGlobe.column(5, 48), north = kGlobe.column(5, 138);
+  const auto text = [](const glm::dvec3& v) { return fmt::format("{},{},{}", v.x, v.y, v.z); };
+  const auto with = [&](const Words& camera) {
+    return pictureOf(file("sea.splats"), file("a.pfm"), camera, "160x120").rgba;
+  };
+  EXPECT_EQ(with({"--look-at", "5,48", "--from-height", "3000"}),
+            with({"--position=" + text(9371.0 * column), "--focal-point=" + text(6371.0 * column),
+                  "--view-up=" + text(north), "--view-angle", "30"}));
+  EXPECT_NE(with({"--look-at", "5,48", "--from-height", "3000", "--view-angle", "40"}),
+            with({"--look-at", "5,48", "--from-height", "3000"}));
+  const auto refused = [&](const Words& words, int status, const std::string& says) {
+    expectRefused(Words{"render", file("sea.splats"), "-o", file("a.png")} + words, status, {says});
+  };
+  refused({"--look-at", "5,48"}, 2, "--look-at and --from-height need one another");
+  refused({"--look-at", "5,98", "--from-height", "9"}, 2,
+          "--look-at 5,98: expected a longitude and a latitude");
+  refused({"--look-at", "5,48", "--from-height", "-9"}, 2, "--from-height");
+  refused({"--look-at", "5,48", "--from-height", "9", "--view", "+x"}, 2,
+          "--look-at cannot be combined with --view");
+}
+
+TEST_F(GlobeOptions, TheAxesGridHasLongitudesLatitudesAndDepths) {
+  const auto grid = [](const std::string& cache, const Words& more) {
+    return pictureOf(file(cache + ".splats"), file("a.pfm"),
+                     Words{"--look-at", "5,48", "--from-height", "6000", "--volume", "off", "--background",
+                           "black", "--axes-titles", ",,"} +
+                         more,
+                     "300x300");
+  };
+  for (const std::string cache : {"sea", "flat"}) {
+    // The same lines as lines of places: those of the box's bottom, 4 km deep.
+    const std::string far = csv("far.geojson", R"({"type": "Point", "coordinates": [120, 0]})");
+    const Image axes = grid(cache, {"--axes-grid", "--lines", far});
+    for (const auto& [place, expected] :
+         {std::pair("0,43.3,4000", true), {"7.7,50,4000", true}, {"7.7,43.3,4000", false}}) {
+      const Image point =
+          grid(cache, {"--points", csv("p.csv", std::string("lon,lat,depth\n") + place + "\n"),
+                       "--point-size", "4px", "--lines-colour", "#ff0000"});
+      bool inked = false;
+      int pixels = 0;
+      for (int y = 0; y < 300; ++y)
+        for (int x = 0; x < 300; ++x) {
+          const bool is_point =
+              point.pixel(x, y)[0] > 0.2f && point.pixel(x, y)[1] < 0.5f * point.pixel(x, y)[0];
+          pixels += is_point;
+          inked |= is_point && axes.pixel(x, y)[1] > 0.02f;
+        }
+      EXPECT_GT(pixels, 0) << cache << ' ' << place;
+      EXPECT_EQ(inked, expected) << cache << ' ' << place;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
