@@ -28,6 +28,10 @@ class Longitudes {
  public:
   void add(double west, double east) {
     const double part = 360.0 / kParts;
+    if (!(east - west < 360)) {
+      covered_.fill(true);
+      return;
+    }
     const auto first = static_cast<int64_t>(std::floor(west / part)),
                last = std::min(static_cast<int64_t>(std::floor(east / part)), first + int64_t{kParts} - 1);
     for (int64_t n = first; n <= last; ++n) {
@@ -167,10 +171,15 @@ std::optional<AnnotatedScene::OnGlobe> boxOnGlobe(const CacheReader& cache,
                             reach(up) / std::abs(globe->vertical_scale));
       lower = glm::min(lower, place - half);
       upper = glm::max(upper, place + half);
-      longitudes.add(place.x - half.x, place.x + half.x);
+      if (globe->sphere()) longitudes.add(place.x - half.x, place.x + half.x);
     }
   }
-  if (!(lower.x <= upper.x)) return std::nullopt;
+  // A globe that is not the data's, or one whose heights are all the same.
+  constexpr double kMaxDegrees = 1e6, kMaxHeight = 1e12;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double most = axis == 2 ? kMaxHeight : kMaxDegrees;
+    if (!(lower[axis] <= upper[axis] && lower[axis] >= -most && upper[axis] <= most)) return std::nullopt;
+  }
   if (globe->sphere()) {
     const auto [west, east] = longitudes.range();
     lower.x = west;
