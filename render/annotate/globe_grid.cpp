@@ -279,6 +279,10 @@ void drawGlobeLabels(cairo_t* cairo, const AnnotatedScene& scene, const glm::dve
   if (box.around()) return drawLabelsOnEarth(cairo, scene, box, ink);
   const auto centre = box.pixelOf(0.5 * (box.box().lower + box.box().upper));
   if (!centre) return;
+  // Coordinates of an edge that the picture does not show would crowd at the picture's own edge.
+  const auto isInside = [&](const glm::dvec2& at) {
+    return at.x >= 0 && at.y >= 0 && at.x <= scene.view.size.width && at.y <= scene.view.size.height;
+  };
   for (int axis = 0; axis < 3; ++axis) {
     const auto edge = box.labelled(axis);
     if (!edge) continue;
@@ -291,8 +295,10 @@ void drawGlobeLabels(cairo_t* cairo, const AnnotatedScene& scene, const glm::dve
     for (const AxisTick& tick : box.ticks(axis)) {
       glm::dvec3 at = edge->from;
       at[axis] = tick.value;
-      if (const auto point = box.pixelOf(at)) labelled.ticks.emplace_back(*point, tick.label);
+      const auto point = box.pixelOf(at);
+      if (point && isInside(*point)) labelled.ticks.emplace_back(*point, tick.label);
     }
+    if (!isInside(*middle)) labelled.title.clear();
     drawEdgeLabels(cairo, scene, labelled, *centre);
     box.addLine(cairo, edge->from, edge->to, [](const glm::dvec3&) { return true; });
     cairo_stroke(cairo);

@@ -220,16 +220,16 @@ CurveSet parseGeoJson(std::string_view text, const std::filesystem::path& path, 
   return lines.finish();
 }
 
-CurveSet parseShapefile(std::string_view text, const std::filesystem::path& path, const Globe& globe,
+CurveSet parseShapefile(std::string_view bytes, const std::filesystem::path& path, const Globe& globe,
                         const GeographicBox& box) {
-  const ShapeBytes bytes(text, path);
-  if (bytes.size() < kHeader || bytes.big(0) != kFileCode) bytes.fail("is not a shapefile");
+  const ShapeBytes file(bytes, path);
+  if (file.size() < kHeader || file.big(0) != kFileCode) file.fail("is not a shapefile");
   MapLines lines(path, globe, box);
-  for (size_t at = kHeader; at < bytes.size();) {
-    const size_t begin = at + kRecordHeader, end = begin + 2 * size_t{bytes.big(at + 4)};
-    if (end > bytes.size()) bytes.fail("is truncated");
-    if (end < begin + 4) bytes.fail("a record has no shape");
-    addShape(bytes, begin, end, lines);
+  for (size_t at = kHeader; at < file.size();) {
+    const size_t begin = at + kRecordHeader, end = begin + 2 * size_t{file.big(at + 4)};
+    if (end > file.size()) file.fail("is truncated");
+    if (end < begin + 4) file.fail("a record has no shape");
+    addShape(file, begin, end, lines);
     at = end;
   }
   return lines.finish();
