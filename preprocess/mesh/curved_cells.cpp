@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
-#include <tuple>
+#include <utility>
 
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
@@ -28,11 +28,11 @@ std::span<const Edge> edgesOf(CellKind shape) {
 }
 
 std::vector<Place> cornersAt(CellKind shape, CellCurve curve) {
-  const uint8_t n = curve.order, m = curve.layers;
+  const uint8_t n = curve.order, m = curve.layers, r = ordersOf(curve)[1];
   if (shape == CellKind::kTetrahedron) return {{0, 0, 0}, {n, 0, 0}, {0, n, 0}, {0, 0, n}};
   if (shape == CellKind::kPyramid) return {{0, 0, 0}, {n, 0, 0}, {n, n, 0}, {0, n, 0}, {0, 0, n}};
   if (shape == CellKind::kWedge) return {{0, 0, 0}, {n, 0, 0}, {0, n, 0}, {0, 0, m}, {n, 0, m}, {0, n, m}};
-  return {{0, 0, 0}, {n, 0, 0}, {n, n, 0}, {0, n, 0}, {0, 0, m}, {n, 0, m}, {n, n, m}, {0, n, m}};
+  return {{0, 0, 0}, {n, 0, 0}, {n, r, 0}, {0, r, 0}, {0, 0, m}, {n, 0, m}, {n, r, m}, {0, r, m}};
 }
 
 /// (a * (parts - n) + b * n) / parts.
@@ -91,6 +91,10 @@ void forBox(const Place& first, const Place& last, const Add& add) {
 
 }  // namespace
 
+std::array<uint8_t, 3> ordersOf(CellCurve curve) {
+  return {curve.order, curve.rows > 0 ? curve.rows : curve.order, curve.layers};
+}
+
 CellCurve curveOf(CellKind shape, size_t nodes) {
   if (shape == CellKind::kHexahedron && (nodes == 20 || nodes == 24)) return {2, 2, false};
   if (shape == CellKind::kWedge && nodes == 15) return {2, 2, false};
@@ -101,6 +105,7 @@ CellCurve curveOf(CellKind shape, size_t nodes) {
     const size_t next = n + 1, all = shape == CellKind::kTetrahedron  ? next * (n + 2) * (n + 3) / 6
                                      : shape == CellKind::kWedge      ? next * next * (n + 2) / 2
                                      : shape == CellKind::kHexahedron ? next * next * next
+                                     : n > 2                          ? next * (n + 2) * (2 * n + 3) / 6
                                                                       : 0;
     if (nodes == all) return {static_cast<uint8_t>(n), static_cast<uint8_t>(n)};
   }
@@ -122,12 +127,19 @@ std::vector<std::array<uint8_t, 3>> nodesOf(CellKind shape, CellCurve curve) {
                 before_m = static_cast<uint8_t>(m - 1);
   const auto add = [&](const Place& place) { places.push_back(place); };
   if (shape == CellKind::kPyramid) {
-    add({1, 1, 0});
+    // The base, then one layer after another: what is not on an edge.
+    const std::vector<Place> known = places;
+    for (uint8_t k = 0; k < n; ++k)
+      forBox({0, 0, k}, {static_cast<uint8_t>(n - k), static_cast<uint8_t>(n - k), k},
+             [&](const Place& place) {
+               if (std::find(known.begin(), known.end(), place) == known.end()) places.push_back(place);
+             });
   } else if (shape == CellKind::kHexahedron) {
-    for (const uint8_t i : {uint8_t{0}, curve.order}) forBox({i, 1, 1}, {i, before_n, before_m}, add);
-    for (const uint8_t j : {uint8_t{0}, curve.order}) forBox({1, j, 1}, {before_n, j, before_m}, add);
-    for (const uint8_t k : {uint8_t{0}, m}) forBox({1, 1, k}, {before_n, before_n, k}, add);
-    forBox({1, 1, 1}, {before_n, before_n, before_m}, add);
+    const uint8_t r = ordersOf(curve)[1], before_r = static_cast<uint8_t>(r - 1);
+    for (const uint8_t i : {uint8_t{0}, curve.order}) forBox({i, 1, 1}, {i, before_r, before_m}, add);
+    for (const uint8_t j : {uint8_t{0}, r}) forBox({1, j, 1}, {before_n, j, before_m}, add);
+    for (const uint8_t k : {uint8_t{0}, m}) forBox({1, 1, k}, {before_n, before_r, k}, add);
+    forBox({1, 1, 1}, {before_n, before_r, before_m}, add);
   } else {
     const auto addInner = [&](const Place& place) {
       if (place[0] + place[1] < n) add(place);
@@ -194,9 +206,10 @@ CellParts::CellParts(CellKind shape, CellCurve curve) {
     add(kind, corners);
   };
   const auto tetrahedron = [&](std::initializer_list<Place> steps) { part(CellKind::kTetrahedron, steps); };
-  const uint8_t n = curve.order, last = static_cast<uint8_t>(n - 1);
-  const uint8_t last_layer = static_cast<uint8_t>(curve.layers - 1);
-  forBox({0, 0, 0}, {last, last, last_layer}, [&](const Place& place) {
+  const std::array<uint8_t, 3> orders = ordersOf(curve);
+  const uint8_t n = curve.order;
+  const auto before = [](uint8_t order) { return static_cast<uint8_t>(order - 1); };
+  forBox({0, 0, 0}, {before(n), before(orders[1]), before(orders[2])}, [&](const Place& place) {
     from = place;
     const int i = place[0], j = place[1], k = place[2], left = n - i - j;
     if (shape == CellKind::kHexahedron) {
@@ -285,9 +298,9 @@ void CellParts::append(size_t n, std::span<const uint64_t> nodes, MeshCells& out
 
 const CellParts& partsOf(CellKind shape, CellCurve curve) {
   static Mutex mutex;
-  static std::map<std::tuple<CellKind, uint8_t, uint8_t, bool>, std::unique_ptr<const CellParts>> known;
+  static std::map<std::pair<CellKind, CellCurve>, std::unique_ptr<const CellParts>> known;
   const MutexLock lock(mutex);
-  auto& parts = known[{shape, curve.order, curve.layers, curve.complete}];
+  auto& parts = known[{shape, curve}];
   if (!parts) parts = std::make_unique<const CellParts>(shape, curve);
   return *parts;
 }

@@ -19,11 +19,14 @@ namespace curvisplat {
 
 inline constexpr size_t kMaxCurveOrder = 10;
 
+/// The orders along the three axes.
+std::array<uint8_t, 3> ordersOf(CellCurve curve);
+
 /// The curve of a cell with that many nodes; of order 0 if there is no such one.
 CellCurve curveOf(CellKind shape, size_t nodes);
 
 /// (i, j, k) of each node: from 0 to the order. In wedges and tetrahedra i + j (+ k) is the order at most; in
-/// a pyramid i and j are the order less k at most.
+/// a pyramid i and j are the order less k at most. VTK has no pyramids above order 2: their nodes come by layers.
 std::vector<std::array<uint8_t, 3>> nodesOf(CellKind shape, CellCurve curve);
 
 /// Appends a cell with its nodes in VTK's order: one of higher order if it has more of them than corners. If there is no such one, its

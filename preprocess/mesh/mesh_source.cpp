@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "stream/base/error.h"
 
@@ -146,6 +147,23 @@ bool MeshCells::appendPolyhedron(uint64_t count, std::span<const uint64_t> strea
   face_begin.push_back(faces.size());
   hidden.push_back(0);
   return good;
+}
+
+bool isClosed(std::span<const uint32_t> faces) {
+  std::vector<std::pair<uint32_t, uint32_t>> edges;
+  for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}) {
+    const auto of_face = faces.subspan(at + 1, faces[at]);
+    for (size_t n = 0; n < of_face.size(); ++n)
+      if (const auto edge = std::minmax(of_face[n], of_face[(n + 1) % of_face.size()]);
+          edge.first != edge.second)
+        edges.emplace_back(edge);
+  }
+  std::sort(edges.begin(), edges.end());
+  for (size_t n = 0; n < edges.size(); n += 2)
+    if (n + 1 == edges.size() || edges[n] != edges[n + 1] ||
+        (n + 2 < edges.size() && edges[n] == edges[n + 2]))
+      return false;
+  return true;
 }
 
 void checkCells(const MeshCells& cells, const MeshPiece& piece, uint64_t first) {

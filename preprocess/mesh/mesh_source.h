@@ -19,6 +19,7 @@
 // repeated corners is degenerate, and allowed.
 #pragma once
 
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -48,6 +49,10 @@ struct CellCurve {
   uint8_t order = 0;     // 0: not known; the cell is drawn by its corners
   uint8_t layers = 0;    // the order along the third axis
   bool complete = true;  // false: nodes at the corners and the middles of the edges alone
+  uint8_t rows = 0;      // the order along the second axis of a hexahedron; 0: as along the first
+  bool bezier = false;   // its nodes are control points, of which only the corners lie on it (bezier_cells.h)
+
+  auto operator<=>(const CellCurve&) const = default;
 };
 
 /// Cells that follow one another in a piece. Readers begin with clear() and append.
@@ -97,6 +102,9 @@ struct MeshCells {
 /// The faces of a cell, in the form of MeshCells::faces. `own`: facesOfCell() of the cell, which is the
 /// result for a polyhedron.
 std::span<const uint32_t> facesOf(CellKind shape, std::span<const uint32_t> own);
+
+/// Whether each edge of a polyhedron is one of two of its faces, `faces` as facesOfCell() gives them: its volume has a border all round.
+bool isClosed(std::span<const uint32_t> faces);
 
 /// Throws Error, which names the piece's file and the cell, if a cell refers to a point that does not exist.
 /// `first`: the number in the piece of the first of `cells`, for the message.

@@ -125,6 +125,10 @@ class MeshBytes(MeshFormats):
         writer = self.writer(mesh_xdmf_test.XdmfMeshes)
         mesh = Mesh(20)
         self.expect_same_bytes(writer.write(writer.grid(mesh, writer.mixed(mesh))), scalars=("p", "c"))
+        mesh, _, bare = writer.tetrahedra(8)
+        ten = writer.ten_points(mesh)
+        functions = writer.function("p", 2, "DG", writer.by_ufc(ten.sum(2))) + writer.function("c", 0, "DG", mesh.c[:, None, None])
+        self.expect_same_bytes(writer.write(bare + functions + "</Grid>"), scalars=("p", "c"))
 
     @unittest.skipUnless(IS_WHOLE, ONLY_WHOLE)
     def test_tecplot(self):
@@ -137,6 +141,8 @@ class MeshBytes(MeshFormats):
         path = self.folder / "shell.vtu"
         points, cells = mesh_curved_test.shell(7, 3)
         write_xml(mesh_curved_test.grid_of(vtk.VTK_LAGRANGE_HEXAHEDRON, points, cells), path)
+        self.expect_same_bytes(path, scalars=("p", "c"))
+        write_xml(mesh_curved_test.grid_of(vtk.VTK_BEZIER_HEXAHEDRON, points, cells), path)
         self.expect_same_bytes(path, scalars=("p", "c"))
 
     def columns(self):

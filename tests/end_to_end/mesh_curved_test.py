@@ -136,14 +136,101 @@ class CurvedCells(MeshCase):
             caches.append(self.manifest(self.convert([self.folder / "a.vtk"], "c"))["volume"])
         self.assertEqual(len({round(volume, 6) for volume in caches}), 1)
 
+    def bezier(self, kind, controls, values, weights=None, degrees=None):
+        grid = grid_of(kind, controls, [range(len(controls))], values)
+        for data, name, array in ((grid.GetPointData(), "RationalWeights", weights), (grid.GetCellData(), "HigherOrderDegrees", degrees)):
+            if array is not None:
+                array = numpy_to_vtk(np.array(array, dtype=float), deep=True)
+                array.SetName(name)
+                getattr(data, f"Set{name}")(array)
+        return grid
+
+    def probe(self, path, scalar, points):
+        """The values of the grid's own cells."""
+        table = self.folder / "points.txt"
+        np.savetxt(table, points, delimiter=",")
+        result = self.run_program("info", self.convert([path], scalar), "--probe", table, "--source")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return np.array([[float(word) for word in line.split(",")[:4]] for line in result.stdout.splitlines()[1:]])
+
+    def test_bezier_cells(self):
+        """Points within, and values there, as VTK's own cells have them: control points and weights at random."""
+        random = np.random.default_rng(3)
+        for kind, lagrange, order, degrees in ((vtk.VTK_BEZIER_HEXAHEDRON, vtk.VTK_LAGRANGE_HEXAHEDRON, 3, None), (vtk.VTK_BEZIER_WEDGE, vtk.VTK_LAGRANGE_WEDGE, 4, None),
+                                               (vtk.VTK_BEZIER_TETRAHEDRON, vtk.VTK_LAGRANGE_TETRAHEDRON, 5, None), (vtk.VTK_BEZIER_HEXAHEDRON, None, 4, (4, 2, 3))):
+            for rational in (False, True):
+                with self.subTest(kind=kind, rational=rational):
+                    if lagrange:
+                        places = nodes_of(lagrange, order)
+                    else:
+                        places, (a, b, c) = np.empty((60, 3)), degrees
+                        for i, j, k in np.ndindex(a + 1, b + 1, c + 1):
+                            places[vtk.vtkHigherOrderHexahedron.PointIndexFromIJK(i, j, k, [*degrees, 60])] = i / a, j / b, k / c
+                    controls = places + random.uniform(-0.05, 0.05, places.shape)
+                    values = random.random(len(places))
+                    grid = self.bezier(kind, controls, values, random.uniform(0.5, 2, len(places)) if rational else None, [degrees] if degrees else None)
+                    path = self.folder / "a.vtu"
+                    write_xml(grid, path)
+                    inner = [p for p in places if (p > 1e-9).all() and (p < 1 - 1e-9).all() and (kind == vtk.VTK_BEZIER_HEXAHEDRON or p[0] + p[1] + p[2] * (kind == vtk.VTK_BEZIER_TETRAHEDRON) < 1 - 1e-9)]
+                    self.assertGreater(len(inner), 3)
+                    cell, at, expected = grid.GetCell(0), [], []
+                    for place in inner:
+                        point, shares = [0.0] * 3, [0.0] * len(places)
+                        cell.EvaluateLocation(vtk.reference(0), place, point, shares)
+                        at.append(point)
+                        expected.append(np.dot(shares, values))
+                    found = self.probe(path, "p", at)
+                    np.testing.assert_allclose(found[:, 3], expected, atol=2e-6)
+                    info = self.info(path)
+                    self.assertEqual(info["cells"]["count"], (len(inner) and np.prod(degrees or (order,) * 3)))
+                    self.assertEqual(self.info(path, "--order", "1")["nodes"], len(places))
+
+    def test_a_rational_ring(self):
+        """Four quarters of a ring, by rational cells of orders 2, 1 and 1; --order 1 draws their corners."""
+        weight, degrees = np.sqrt(0.5), (2, 1, 1)
+        places = np.empty((12, 3))
+        for i, j, k in np.ndindex(3, 2, 2):
+            places[vtk.vtkHigherOrderHexahedron.PointIndexFromIJK(i, j, k, [*degrees, 12])] = i, j, k
+        i, j, k = places.T
+        quarter = np.stack([(1 + j) * (i < 2), (1 + j) * (i > 0), 3 * k], 1)
+        turned = [np.stack([c * quarter[:, 0] - s * quarter[:, 1], s * quarter[:, 0] + c * quarter[:, 1], quarter[:, 2]], 1) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+        points = np.concatenate(turned)
+        grid = grid_of(vtk.VTK_BEZIER_HEXAHEDRON, points, np.arange(48).reshape(4, 12))
+        weights = numpy_to_vtk(np.tile(np.where(i == 1, weight, 1), 4), deep=True)
+        weights.SetName("RationalWeights")
+        grid.GetPointData().SetRationalWeights(weights)
+        orders = numpy_to_vtk(np.tile(np.array(degrees, float), (4, 1)), deep=True)
+        orders.SetName("HigherOrderDegrees")
+        grid.GetCellData().SetHigherOrderDegrees(orders)
+        path, exact = self.folder / "ring.vtu", np.pi * (4 - 1) * 3
+        write_xml(grid, path)
+        self.assertEqual(self.info(path)["cells"]["count"], 8)
+        for scalar in ("p", "c"):
+            self.assertAlmostEqual(self.volume(path, scalar) / exact, 1, delta=1e-3)
+        np.testing.assert_allclose(self.info(path)["bounds"]["upper"], (2, 2, 3), atol=1e-12)
+
+    def test_lagrange_cells_of_several_orders(self):
+        """HigherOrderDegrees: 2 x 2 x 5 nodes are as many as a quadratic hexahedron has at its corners and edges."""
+        degrees = (1, 1, 4)
+        places = np.empty((20, 3))
+        for i, j, k in np.ndindex(2, 2, 5):
+            places[vtk.vtkHigherOrderHexahedron.PointIndexFromIJK(i, j, k, [*degrees, 20])] = i, j, k / 4
+        places[:, 0] += np.sin(np.pi * places[:, 2])
+        grid = self.bezier(vtk.VTK_LAGRANGE_HEXAHEDRON, places, places[:, 2], degrees=[degrees])
+        path = self.folder / "a.vtu"
+        write_xml(grid, path)
+        self.assertEqual(self.info(path)["cells"]["count"], 4)
+        self.assertAlmostEqual(self.volume(path, "p"), 1, delta=1e-3)
+
     def test_cells_without_a_known_order(self):
-        """Bezier's cells are drawn by their corners, whose control points are the only ones that lie on them."""
+        """Pyramids of Lagrange and Bezier, whose nodes have no order in VTK, and numbers of nodes that no order has."""
         points = nodes_of(vtk.VTK_LAGRANGE_HEXAHEDRON, 2)
         path = self.folder / "a.vtu"
-        write_xml(grid_of(vtk.VTK_BEZIER_HEXAHEDRON, points, [range(27)]), path)
-        info = self.info(path)
-        self.assertEqual(info["cells"]["count"], 1)
-        self.assertIn("1 of 1 solid cells are quadratic or of higher order; they are drawn by their corners", info["warnings"])
+        for kind, count in ((vtk.VTK_BEZIER_PYRAMID, 14), (vtk.VTK_BEZIER_HEXAHEDRON, 20), (vtk.VTK_BEZIER_HEXAHEDRON, 26)):
+            write_xml(grid_of(kind, points[:count], [range(count)]), path)
+            info = self.info(path)
+            self.assertEqual(info["cells"]["count"], 1)
+            self.assertIn("1 of 1 solid cells are quadratic or of higher order; they are drawn by their corners", info["warnings"])
 
 
 if __name__ == "__main__":

@@ -5,10 +5,14 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
 #include <numbers>
 #include <numeric>
+#include <span>
+#include <utility>
 #include <vector>
 
+#include "preprocess/mesh/bezier_cells.h"
 #include "preprocess/mesh/curved_volumes.h"
 
 namespace curvisplat {
@@ -25,7 +29,7 @@ TEST(CurvedCells, PartsOfAShellOfOneLayerHaveItsVolume) {
   const CellParts& parts = partsOf(CellKind::kHexahedron, kCurve);
   ASSERT_EQ(parts.size(), 343u);
   std::vector<double> volumes(parts.size());
-  volumesOf(CellKind::kHexahedron, kCurve)->measure(nodes, volumes);
+  volumesOf(CellKind::kHexahedron, kCurve)->measure(nodes, {}, volumes);
   const double exact = 4 * std::numbers::pi / 3 * (8 - 1) / 24;
   EXPECT_NEAR(std::accumulate(volumes.begin(), volumes.end(), 0.0) / exact, 1, 1e-6);
 }
@@ -41,6 +45,15 @@ double exactVolume(CellKind shape) {
   if (shape == CellKind::kTetrahedron) return of(1.0 / 6, 0.25);
   if (shape == CellKind::kWedge) return of(1.0 / 2, 1.0 / 3);
   return of(1, 0.5);
+}
+
+TEST(CurvedCells, PolyhedraWithoutAFaceAreOpen) {
+  const auto faces = facesOf(CellKind::kHexahedron, {});
+  EXPECT_TRUE(isClosed(faces));
+  EXPECT_FALSE(isClosed(faces.subspan(5)));
+  const std::vector<uint32_t> doubled{3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2};
+  EXPECT_FALSE(isClosed(doubled));
+  EXPECT_TRUE(isClosed({}));
 }
 
 TEST(CurvedCells, PartsOfBentCellsHaveTheirVolumes) {
@@ -60,10 +73,79 @@ TEST(CurvedCells, PartsOfBentCellsHaveTheirVolumes) {
     const CellParts& parts = partsOf(c.shape, c.curve);
     EXPECT_EQ(parts.size(), c.parts);
     std::vector<double> volumes(parts.size());
-    volumesOf(c.shape, c.curve)->measure(nodes, volumes);
+    volumesOf(c.shape, c.curve)->measure(nodes, {}, volumes);
     EXPECT_NEAR(std::accumulate(volumes.begin(), volumes.end(), 0.0), exactVolume(c.shape), 1e-12)
         << static_cast<int>(c.shape) << " of order " << static_cast<int>(c.curve.order);
   }
+}
+
+TEST(CurvedCells, OrdersAlongTheAxesMayDiffer) {
+  constexpr CellCurve kCurve{3, 4, true, 2};
+  std::vector<glm::dvec3> nodes;
+  for (const auto& [i, j, k] : nodesOf(CellKind::kHexahedron, kCurve))
+    nodes.push_back(bent({i / 3.0, j / 2.0, k / 4.0}));
+  ASSERT_EQ(nodes.size(), 60u);
+  std::vector<double> volumes(partsOf(CellKind::kHexahedron, kCurve).size());
+  EXPECT_EQ(volumes.size(), 24u);
+  volumesOf(CellKind::kHexahedron, kCurve)->measure(nodes, {}, volumes);
+  EXPECT_NEAR(std::accumulate(volumes.begin(), volumes.end(), 0.0), exactVolume(CellKind::kHexahedron),
+              1e-12);
+}
+
+TEST(CurvedCells, BezierCellsHaveTheirPolynomialAtTheNodes) {
+  for (const auto& [shape, curve] :
+       {std::pair(CellKind::kTetrahedron, CellCurve{4, 4}), std::pair(CellKind::kWedge, CellCurve{3, 5}),
+        std::pair(CellKind::kHexahedron, CellCurve{2, 4, true, 3}),
+        std::pair(CellKind::kHexahedron, CellCurve{10, 10})}) {
+    // The control values of x squared, and of x and z, which are the places of the control points.
+    const double n = curve.order, m = curve.layers;
+    std::vector<double> values;
+    const auto places = nodesOf(shape, curve);
+    for (const auto& [i, j, k] : places)
+      for (const double value : {i * (i - 1) / (n * (n - 1)), i / n, k / m}) values.push_back(value);
+    bezierOf(shape, curve).evaluate(values, 3);
+    for (size_t node = 0; node < places.size(); ++node) {
+      const double x = places[node][0] / n;
+      EXPECT_NEAR(values[3 * node], x * x, 1e-13);
+      EXPECT_NEAR(values[3 * node + 1], x, 1e-13);
+      EXPECT_NEAR(values[3 * node + 2], places[node][2] / m, 1e-13);
+    }
+  }
+}
+
+/// The volume of a rational Bezier cell over its exact one.
+double shareOfVolume(CellKind shape, CellCurve curve, std::span<const glm::dvec4> controls, double exact) {
+  std::vector<double> values;
+  for (const glm::dvec4& control : controls)
+    for (int c = 0; c < 4; ++c) values.push_back(c < 3 ? control[c] * control.w : control.w);
+  bezierOf(shape, curve).evaluate(values, 4);
+  std::vector<glm::dvec3> nodes;
+  std::vector<double> weights;
+  for (size_t n = 0; n < values.size(); n += 4) {
+    nodes.push_back(glm::dvec3(values[n], values[n + 1], values[n + 2]) / values[n + 3]);
+    weights.push_back(values[n + 3]);
+  }
+  std::vector<double> volumes(partsOf(shape, curve).size());
+  volumesOf(shape, curve, true)->measure(nodes, weights, volumes);
+  return std::accumulate(volumes.begin(), volumes.end(), 0.0) / exact;
+}
+
+TEST(CurvedCells, PartsOfRationalCellsHaveTheVolumesOfCircles) {
+  constexpr double kWeight = std::numbers::sqrt2 / 2;
+  // A quarter of a ring between the radii 1 and 2, of height 3: the middle control points are where tangents meet.
+  constexpr CellCurve kRing{2, 1, true, 1};
+  std::vector<glm::dvec4> ring;
+  for (const auto& [i, j, k] : nodesOf(CellKind::kHexahedron, kRing))
+    ring.emplace_back((1.0 + j) * (i < 2), (1.0 + j) * (i > 0), 3.0 * k, i == 1 ? kWeight : 1);
+  EXPECT_NEAR(shareOfVolume(CellKind::kHexahedron, kRing, ring, std::numbers::pi / 4 * (4 - 1) * 3), 1, 1e-6);
+  // A quarter of a disc of radius 2 and height 1.
+  constexpr CellCurve kSector{2, 1};
+  std::vector<glm::dvec4> sector;
+  for (const auto& [i, j, k] : nodesOf(CellKind::kWedge, kSector)) {
+    const bool tangents = i == 1 && j == 1;
+    sector.emplace_back(tangents ? 2 : i, tangents ? 2 : j, k, tangents ? kWeight : 1);
+  }
+  EXPECT_NEAR(shareOfVolume(CellKind::kWedge, kSector, sector, std::numbers::pi), 1, 1e-6);
 }
 
 TEST(CurvedCells, OrdersOfExodusAndCgnsBecomeThatOfVtk) {

@@ -27,7 +27,8 @@ enum class VtkCellGroup : uint8_t {
   kUnknown,
 };
 
-constexpr uint8_t kVtkPolyhedron = 42, kVtkLagrangeHexahedron = 72, kVtkLagrangePyramid = 74;
+constexpr uint8_t kVtkPolyhedron = 42, kVtkLagrangeHexahedron = 72, kVtkLagrangePyramid = 74,
+                  kVtkBezierTetrahedron = 78, kVtkBezierPyramid = 81;
 
 /// The solid that has the type's corners; kNone: another, or none.
 CellKind kindOf(uint8_t type) {
@@ -77,9 +78,28 @@ VtkCellGroup groupOf(uint8_t type) {
   return VtkCellGroup::kUnknown;
 }
 
+/// The curve of a cell by its number of nodes and, of hexahedra and wedges, by its HigherOrderDegrees.
+CellCurve curveOfCell(uint8_t type, size_t nodes, std::span<const double> degrees) {
+  const CellKind shape = kindOf(type);
+  const bool bezier = type >= kVtkBezierTetrahedron;
+  if (degrees.size() == 3 && type >= kVtkLagrangeHexahedron && shape != CellKind::kTetrahedron &&
+      std::all_of(degrees.begin(), degrees.end(), [](double n) { return n >= 1 && n <= kMaxCurveOrder; })) {
+    CellCurve curve{static_cast<uint8_t>(degrees[0]), static_cast<uint8_t>(degrees[2])};
+    if (degrees[1] != degrees[0]) curve.rows = static_cast<uint8_t>(degrees[1]);
+    curve.bezier = bezier;
+    const bool fits = shape == CellKind::kHexahedron || curve.rows == 0;
+    if (fits && nodesOf(shape, curve).size() == nodes) return curve;
+  }
+  CellCurve curve = curveOf(shape, nodes);
+  if (bezier && !curve.complete) return {};
+  curve.bezier = bezier;
+  return curve;
+}
+
 /// Appends a cell of any type but kVtkPolyhedron; kNone if it has fewer points than its type needs. `older`: two edges of
-/// Lagrange's hexahedra are in each other's place, as before VTK 9.1.
-void appendVtkCell(uint8_t type, std::span<const uint64_t> points, bool older, MeshCells& out) {
+/// Lagrange's hexahedra are in each other's place, as before VTK 9.1. `degrees`: the cell's HigherOrderDegrees; may be empty.
+void appendVtkCell(uint8_t type, std::span<const uint64_t> points, bool older,
+                   std::span<const double> degrees, MeshCells& out) {
   constexpr uint8_t kVoxel = 11, kPentagonalPrism = 15, kHexagonalPrism = 16;
   if (type == kVoxel && points.size() >= 8) {
     const std::array<uint64_t, 8> round{points[0], points[1], points[3], points[2],
@@ -89,17 +109,21 @@ void appendVtkCell(uint8_t type, std::span<const uint64_t> points, bool older, M
   if (type == kPentagonalPrism) return appendPrism(5, points, out);
   if (type == kHexagonalPrism) return appendPrism(6, points, out);
   if (groupOf(type) != VtkCellGroup::kCurved) return out.append(kindOf(type), points);
-  // The control points of Bezier's cells, but their corners, lie outside. Pyramids of Lagrange have no order of nodes in VTK.
-  if (type >= kVtkLagrangePyramid) return out.appendCurved(kindOf(type), CellCurve{}, points);
-  if (type != kVtkLagrangeHexahedron || !older) return appendCurved(kindOf(type), points, out);
+  // VTK has no order of nodes for pyramids of Lagrange and Bezier.
+  if (type == kVtkLagrangePyramid || type == kVtkBezierPyramid)
+    return out.appendCurved(kindOf(type), CellCurve{}, points);
+  if (type < kVtkLagrangeHexahedron) return appendCurved(kindOf(type), points, out);
+  if (points.size() <= cornersOf(kindOf(type))) return out.append(kindOf(type), points);
+  const CellCurve curve = curveOfCell(type, points.size(), degrees);
+  if (type != kVtkLagrangeHexahedron || !older) return out.appendCurved(kindOf(type), curve, points);
   std::vector<uint64_t> nodes(points.begin(), points.end());
-  const size_t along = curveOf(CellKind::kHexahedron, points.size()).order;
-  if (along > 1) {
+  const size_t along = curve.layers;
+  if (curve.rows == 0 && curve.layers == curve.order && along > 1) {
     const auto edge = nodes.begin() + static_cast<ptrdiff_t>(8 + 10 * (along - 1));
     std::rotate(edge, edge + static_cast<ptrdiff_t>(along - 1),
                 edge + static_cast<ptrdiff_t>(2 * (along - 1)));
   }
-  appendCurved(CellKind::kHexahedron, nodes, out);
+  out.appendCurved(CellKind::kHexahedron, curve, nodes);
 }
 
 // Bits of vtkGhostType (vtkDataSetAttributes). Another piece has a duplicate cell; a duplicate point may
@@ -135,6 +159,21 @@ void readHiddenCells(const VtkPiece& piece, uint64_t first, uint64_t count, int 
   if (piece.cell_ghosts || !piece.cell_levels) return;
   const std::vector<float> levels = readAsFloats(*piece.cell_levels, first, count);
   for (size_t n = 0; n < count; ++n) out[n] = levels[n] > 0;
+}
+
+/// The HigherOrderDegrees of some cells, three each; empty if the piece has none. (Floats would have FloatOffset subtracted.)
+std::vector<double> readDegrees(const VtkPiece& piece, uint64_t first, uint64_t count) {
+  const auto found = std::find_if(piece.cell_data.begin(), piece.cell_data.end(), [](const VtkArray& array) {
+    return array.name == "HigherOrderDegrees" && array.components == 3;
+  });
+  if (found == piece.cell_data.end()) return {};
+  std::vector<double> degrees(3 * count), along(count);
+  for (int axis = 0; axis < 3; ++axis) {
+    const WantedComponent<double> wanted{axis, along.data()};
+    readTuples<double>(*found, first, count, std::span(&wanted, 1));
+    for (size_t n = 0; n < count; ++n) degrees[3 * n + static_cast<size_t>(axis)] = along[n];
+  }
+  return degrees;
 }
 
 /// Places where each of some cells begins, and the end of the last, in an array of `length`.
@@ -294,6 +333,7 @@ void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t co
     throw Error("{}: cells {} to {} have {} points; expected at most {}; the file is damaged", piece.file,
                 first, first + count - 1, begins.back() - begins.front(), kMaxPoints);
   readIntegers(cells.connectivity, begins.front(), begins.back() - begins.front(), points);
+  const std::vector<double> degrees = readDegrees(mesh_.pieces[piece_number], first, count);
   std::vector<uint64_t> face_ends;
   if (cells.face_ends) readIntegers(*cells.face_ends, first, count, face_ends);
   // The faces of a polyhedron begin where those of the one before it end.
@@ -312,7 +352,8 @@ void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t co
         std::span<const uint64_t>(points).subspan(begins[n] - begins.front(), begins[n + 1] - begins[n]);
     if (cells.counted && !of_cell.empty()) of_cell = of_cell.subspan(1);
     if (types[n] != kVtkPolyhedron) {
-      appendVtkCell(static_cast<uint8_t>(types[n]), of_cell, cells.older_edges, out);
+      appendVtkCell(static_cast<uint8_t>(types[n]), of_cell, cells.older_edges,
+                    std::span(degrees).subspan(3 * (degrees.empty() ? 0 : n), degrees.empty() ? 0 : 3), out);
       if (out.shapes.back() == CellKind::kNone &&
           groupOf(static_cast<uint8_t>(types[n])) != VtkCellGroup::kNotSolid)
         throw Error("{}: cell {} of type {} has {} points, too few; the file is damaged", piece.file,
