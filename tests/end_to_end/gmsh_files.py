@@ -24,8 +24,17 @@ LATTICES = {31: (vtk.VTK_LAGRANGE_TETRAHEDRON, 5, """
 232 233 323 111 114 112 113 311 314 312 313 131 134 132 133 211 214 212 213 221 224 222 223 121 124 122 123""")}
 
 
-def lattice_of(gmsh_type):
-    _, order, text = LATTICES[gmsh_type]
+# Of pyramids, which VTK does not have: by the order Gmsh's type and the nodes.
+PYRAMIDS = {3: (118, """
+000 300 330 030 003 100 200 010 020 001 002 310 320 201 102 230 130 221 112 021 012 101 011 211 121 110 120 220 210 111"""), 4: (119, """
+000 400 440 040 004 100 200 300 010 020 030 001 002 003 410 420 430 301 202 103 340 240 140 331 222 113 031 022 013 101 201 102 021 011
+012 311 321 212 231 131 122 110 130 330 310 120 230 320 210 220 111 211 221 121 112"""), 5: (120, """
+000 500 550 050 005 100 200 300 400 010 020 030 040 001 002 003 004 510 520 530 540 401 302 203 104 450 350 250 150 441 332 223 114 041
+032 023 014 101 301 103 201 202 102 031 011 013 021 012 022 411 431 213 421 322 312 341 141 123 241 132 232 110 140 440 410 120 130 240
+340 430 420 310 210 220 230 330 320 111 311 331 131 113 211 121 112 321 212 231 222 122 221""")}
+
+
+def lattice_of(order, text):
     return np.array([[int(digit) for digit in node] for node in text.split()]) / order
 
 
@@ -39,18 +48,20 @@ class Msh:
         self.cells = []
         for n in range(grid.GetNumberOfCells()):
             kind, nodes = tags.get("kinds", TYPES)[grid.GetCellType(n)]
-            ids = [grid.GetCell(n).GetPointId(k) for k in range(grid.GetCell(n).GetNumberOfPoints())]
+            points = vtk.vtkIdList()
+            grid.GetCellPoints(n, points)
+            ids = [points.GetId(k) for k in range(points.GetNumberOfIds())]
             self.cells.append((kind, [ids[k] for k in nodes]))
         self.tags = np.asarray(tags.get("tags", np.arange(len(self.points)) + 1))
-        self.groups = tags.get("groups", 1)
+        self.groups, self.partition = tags.get("groups", 1), tags.get("partition")  # its number, and how many files there are
         self.element_tags = np.asarray(tags.get("element_tags", (np.arange(len(self.cells)) + 1) * self.groups))
         self.out = [b"$MeshFormat\n%g %d 8\n" % (version, bool(order)) + (struct.pack(order + "i", 1) + b"\n" if order else b"") + b"$EndMeshFormat\n"]
 
     def numbers(self, kinds, *values):
-        """`kinds`: as struct's; N is a size or the number of a node or element."""
+        """`kinds`: as struct's; N is the number of a node or element, C a size."""
         if not self.order:
             return (" ".join(repr(float(v)) if kind == "d" else str(int(v)) for kind, v in zip(kinds, values)) + "\n").encode()
-        return struct.pack(self.order + kinds.replace("N", "q" if self.version > 4 else "i"), *values)
+        return struct.pack(self.order + kinds.replace("N", "q" if self.version > 4 else "i").replace("C", "q" if self.version >= 4 else "i"), *values)
 
     def section(self, name, *parts):
         self.out.append(f"${name}\n".encode() + b"".join(parts) + (b"\n" if self.order else b"") + f"$End{name}\n".encode())
@@ -68,7 +79,22 @@ class Msh:
                 parts.append(head + self.numbers("ii" + "N" * len(nodes), 1, 1, *tags[nodes]))
             self.section("Elements", *parts)
             return self
+        if self.partition:
+            of_volume = self.numbers("iiiCi", 1, 3, 1, 1, self.partition[0])
+            of_volume += self.numbers("ddddddCC", 0, 0, 0, 1, 1, 1, 0, 0)
+            self.section("PartitionedEntities", self.numbers("CCCCCC", self.partition[1], 0, 0, 0, 0, 1), of_volume)
         half = n // 2  # one entity has coordinates of its own
+        if self.version == 4:  # numbers stand before their places, and an entity's before its dimension
+            parts = [self.numbers("CC", 2, n)]
+            for dimension, parametric, some in ((2, 1, slice(half)), (3, 0, slice(half, n))):
+                parts.append(self.numbers("iiiC", 1, dimension, parametric, len(tags[some])))
+                parts += [self.numbers("Nddd" + "dd" * parametric, tag, *place, *[0.5, 0.25] * parametric) for tag, place in zip(tags[some], self.points[some])]
+            self.section("Nodes", *parts)
+            parts = [self.numbers("CC", len(self.cells), len(self.cells))]
+            for tag, (kind, nodes) in zip(self.element_tags, self.cells):
+                parts.append(self.numbers("iiiC", 1, 3, kind, 1) + self.numbers("N" * (1 + len(nodes)), tag, *tags[nodes]))
+            self.section("Elements", *parts)
+            return self
         parts = [self.numbers("NNNN", 2, n, tags.min(), tags.max())]
         for dimension, parametric, some in ((2, 1, slice(half)), (3, 0, slice(half, n))):
             parts.append(self.numbers("iiiN", dimension, 1, parametric, len(tags[some])))

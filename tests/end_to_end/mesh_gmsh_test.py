@@ -12,7 +12,7 @@ try:
     import vtk
     from vtk.util.numpy_support import vtk_to_numpy
 
-    from gmsh_files import LATTICES, Msh, lattice_of
+    from gmsh_files import LATTICES, PYRAMIDS, Msh, lattice_of
     from mesh_case import MeshCase
     from mesh_cubes import RANDOM, cube
     from mesh_curved_test import grid_of, nodes_of
@@ -28,7 +28,7 @@ except ModuleNotFoundError:
 
 
 class MeshGmsh(MeshCase):
-    VARIANTS = [(4.1, "<"), (4.1, ""), (2.2, "<"), (2.2, ""), (4.1, ">"), (2.2, ">")]
+    VARIANTS = [(4.1, "<"), (4.1, ""), (2.2, "<"), (2.2, ""), (4.1, ">"), (2.2, ">"), (4, "<"), (4, "")]
 
     def written(self, grid, version=4.1, order="<", **tags):
         file = Msh(grid, version, order, **tags).mesh()
@@ -51,7 +51,7 @@ class MeshGmsh(MeshCase):
                 path = self.written(grid, version, order)
                 self.expect_same_caches([path], expected)
                 self.check(path, grid)
-        self.assertEqual(self.info(path)["format"], "Gmsh 2.2, binary")
+        self.assertEqual(self.info(path)["format"], "Gmsh 4.0, ASCII")
 
     def test_numbers_in_any_order(self):
         grid = cube(kinds=("hexahedron", "tetrahedra", "face"))
@@ -70,14 +70,47 @@ class MeshGmsh(MeshCase):
             self.expect_same_caches([self.written(grid, version, order)], self.vtu(grid))
 
     def test_cells_of_higher_order(self):
-        for kind, (of_vtk, order, _) in LATTICES.items():
+        for kind, (of_vtk, order, text) in LATTICES.items():
             places = nodes_of(of_vtk, order)
             number = {tuple(place.round(9)): n for n, place in enumerate(places)}
-            kinds = {of_vtk: (kind, [number[tuple(place.round(9))] for place in lattice_of(kind)])}
+            kinds = {of_vtk: (kind, [number[tuple(place.round(9))] for place in lattice_of(order, text)])}
             grid = grid_of(of_vtk, places + RANDOM.uniform(-0.02, 0.02, places.shape), [range(len(places))], RANDOM.random(len(places)))
             for version, binary in some_of(self.VARIANTS[:4], 2):
                 path = Msh(grid, version, binary, kinds=kinds).mesh().data("p", vtk_to_numpy(grid.GetPointData().GetArray("p"))).write(self.folder / "a.msh")
                 self.expect_same_caches([path], self.vtu(grid), names={"c": None})
+
+    def test_pyramids_of_higher_order(self):
+        """A straight one is filled, whatever the order of its nodes, only if that is read right."""
+        for order, (kind, text) in PYRAMIDS.items():
+            places = lattice_of(order, text)
+            grid = grid_of(vtk.VTK_LAGRANGE_PYRAMID, places, [range(len(places))], places @ (1, 2, 3))
+            path = Msh(grid, 4.1, "", kinds={vtk.VTK_LAGRANGE_PYRAMID: (kind, range(len(places)))}).mesh().data("p", vtk_to_numpy(grid.GetPointData().GetArray("p"))).write(self.folder / "a.msh")
+            info = self.info(path)
+            along = np.arange(1, order + 1)
+            self.assertEqual(info["cells"]["pyramids"], (along**2 + (along - 1)**2).sum())
+            self.assertEqual(info["cells"]["tetrahedra"], (2 * along * (along - 1)).sum())
+            self.assertEqual(info["warnings"], [])
+            self.assertAlmostEqual(self.volume(path, "p"), 1 / 3, delta=1e-3)
+
+    def test_files_of_partitions(self):
+        """As Gmsh saves them with Mesh.PartitionSplitMeshFiles: numbers go through all files, which are no steps of a series."""
+        grid = cube(kinds=("hexahedron",))
+        cells = grid.GetNumberOfCells()
+        for order in ("<", ""):
+            paths = []
+            for part, some in enumerate((range(cells // 2), range(cells // 2, cells)), 1):
+                file = Msh(grid, 4.1, order, partition=(part, 2))
+                used = sorted({node for n in some for node in file.cells[n][1]})
+                renumbered = {node: n for n, node in enumerate(used)}
+                file.cells = [(kind, [renumbered[node] for node in nodes]) for kind, nodes in (file.cells[n] for n in some)]
+                file.tags, file.points, file.element_tags = file.tags[used], file.points[used], file.element_tags[list(some)]
+                paths.append(file.mesh().data("p", vtk_to_numpy(grid.GetPointData().GetArray("p"))[used]).write(self.folder / f"a_{part}.msh"))
+            info = self.info(*paths)
+            self.assertEqual((info["cells"]["count"], [piece["name"] for piece in info["pieces"]], info["warnings"]), (cells, ["a_1.msh", "a_2.msh"], []))
+            whole = self.manifest(self.convert([self.vtu(grid)], "p"))
+            self.assertEqual(self.manifest(self.convert(paths, "p"))["splats"], whole["splats"])
+            self.assertAlmostEqual(self.manifest(self.convert(paths, "p"))["volume"], whole["volume"], delta=1e-3 * whole["volume"])
+            self.assertIn("a_2.msh is part 2 of a mesh that Gmsh saved in 2 files: give all of them", " ".join(self.info(paths[1])["warnings"]))
 
     def test_elements_in_several_groups(self):
         grid = cube(kinds=("hexahedron", "tetrahedra"))
@@ -179,7 +212,7 @@ class MeshGmsh(MeshCase):
                 self.assertIn(result.returncode, (0, 1), result.stderr)
         path = self.folder / "b.msh"
         text = self.written(grid, 2.2, "").read_bytes()
-        for old, new, words in ((b"2.2 0 8", b"4 0 8", "of version 4; expected 4.1 or 2.2"), (b"$Nodes", b"$Knots", "has no $EndKnots"),
+        for old, new, words in ((b"2.2 0 8", b"3 0 8", "of version 3; expected 4.1, 4.0 or 2.2"), (b"$Nodes", b"$Knots", "has no $EndKnots"),
                                 (b"$Nodes\n", b"$Nodes\n99999999\n", "counts 99999999"), (b" 5 2 1 1 ", b" 5 2 1 1 999", "refers to point"),
                                 (b" 5 2 1 1 ", b" 77 2 1 1 ", "elements of type 77"), (b"\n\"p\"\n1\n0.0\n3\n0\n1\n", b"\n\"p\"\n1\n0.0\n3\n0\n0\n", "of 0 components")):
             self.assertIn(old, text)

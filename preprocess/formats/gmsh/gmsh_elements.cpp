@@ -15,7 +15,7 @@ using LatticePoint = std::array<int, 3>;
 using LatticePoints = std::vector<LatticePoint>;
 
 /// A shape whose nodes Gmsh lists by corners, edges, faces, and the same shape inside, of an order that is less by `shrinks`.
-/// Source: Gmsh's reference manual, "Node ordering", and meshes of orders 2 to 7 that Gmsh 4.8 wrote.
+/// Source: Gmsh's reference manual, "Node ordering", and elements of orders 2 to 7 of Gmsh 4.8.
 struct GmshShape {
   std::vector<std::pair<size_t, size_t>> edges;
   std::vector<std::vector<size_t>> faces;
@@ -38,13 +38,14 @@ const GmshShape& shapeOf(CellKind kind) {
   static const GmshShape wedge{{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 4}, {2, 5}, {3, 4}, {3, 5}, {4, 5}},
                                {{0, 2, 1}, {3, 4, 5}, {0, 1, 4, 3}, {0, 3, 5, 2}, {1, 2, 5, 4}}};
   static const GmshShape pyramid{{{0, 1}, {0, 3}, {0, 4}, {1, 2}, {1, 4}, {2, 3}, {2, 4}, {3, 4}},
-                                 {{0, 1, 4}, {3, 0, 4}, {1, 2, 4}, {2, 3, 4}, {0, 3, 2, 1}}};
+                                 {{0, 1, 4}, {3, 0, 4}, {1, 2, 4}, {2, 3, 4}, {0, 3, 2, 1}},
+                                 3};
   if (kind == CellKind::kTetrahedron) return tetrahedron;
   if (kind == CellKind::kHexahedron) return hexahedron;
   return kind == CellKind::kWedge ? wedge : pyramid;
 }
 
-/// The corners of the shape inside: each is moved by one node along each of its edges.
+/// The corners of the shape inside: each is moved by one node along each of its edges, but a pyramid's apex, where four meet.
 LatticePoints inside(const LatticePoints& corners, const GmshShape& shape, int order) {
   LatticePoints moved = corners;
   for (const auto& [a, b] : shape.edges)
@@ -53,6 +54,9 @@ LatticePoints inside(const LatticePoints& corners, const GmshShape& shape, int o
       moved[a][axis] += step;
       moved[b][axis] -= step;
     }
+  constexpr size_t kApex = 4;
+  if (corners.size() == kApex + 1)
+    moved[kApex] = {corners[kApex][0] + 1, corners[kApex][1] + 1, corners[kApex][2] - 2};
   return moved;
 }
 

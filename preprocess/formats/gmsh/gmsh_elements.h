@@ -18,7 +18,7 @@ struct GmshElement {
 };
 
 /// The element of this type; nullptr if it is not read. Those of higher order are not curved where they lack nodes that the
-/// cell of their order has, and pyramids above order 2. Any thread.
+/// cell of their order has. Any thread.
 const GmshElement* gmshElement(int type);
 
 }  // namespace curvisplat

@@ -19,10 +19,12 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/gmsh/gmsh_data.h"
 #include "preprocess/formats/gmsh/gmsh_elements.h"
+#include "preprocess/formats/gmsh/gmsh_parts.h"
 #include "preprocess/formats/gmsh/gmsh_reader.h"
 #include "preprocess/formats/gmsh/gmsh_tags.h"
 #include "preprocess/mesh/curved_cells.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -58,6 +60,8 @@ class GmshSource final : public ElementSource {
   void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override;
   void readFormat();
   void readMesh(const std::string& section);
+  uint64_t readBlocks();
+  int readDimension();
   void readNodes(bool parametric);
   void readElements();
   void readElement(const GmshElement& element, uint64_t tag, NumberSpool<uint64_t>& nodes);
@@ -68,7 +72,9 @@ class GmshSource final : public ElementSource {
 
   std::shared_ptr<SpoolFile> place_spool_, node_spool_, value_spool_, tag_spool_, element_tag_spool_;
   GmshReader reader_;
-  bool version4_ = true;
+  bool version4_ = true, wide_ = true;  // 4.x; 4.1, whose tags are wide
+  std::string version_;
+  GmshPart part_;
   GmshTags node_tags_, element_tags_;
   SpooledNumbers places_, nodes_;
   std::vector<Block> blocks_;
@@ -100,6 +106,7 @@ GmshSource::GmshSource(const OpenGridOptions& options)
       readMesh(name);
       continue;
     }
+    if (name == "PartitionedEntities") part_ = readGmshPart(reader_);
     if (hasGmshData(name)) data_.push_back(readGmshData(reader_, name));
     if (data_.size() > kMaxData) reader_.fail(fmt::format("has more than {} sections of values", kMaxData));
     reader_.skipTo("$End" + name);
@@ -110,38 +117,27 @@ GmshSource::GmshSource(const OpenGridOptions& options)
     throw Error("{}: has no elements with a volume; expected a mesh in three dimensions", reader_.name());
   if (left_out_ > 0)
     description_.warnings.push_back(
-        fmt::format("{} of an order above 2 {} drawn by their corners: pyramids, or without nodes inside",
+        fmt::format("{} of an order above 2 without nodes inside {} drawn by their corners",
                     countText(left_out_, "element"), isOrAre(left_out_)));
   if (repeated_ > 0)
     description_.notes.push_back(fmt::format("{} repeated for further physical groups {} drawn once",
                                              countText(repeated_, "element"), isOrAre(repeated_)));
+  if (part_.parts > 1 && !options.is_part)
+    description_.warnings.push_back(
+        fmt::format("{} is part {} of a mesh that Gmsh saved in {} files: give all of them, as NAME_*.msh",
+                    options.grid.filename().string(), part_.part, part_.parts));
   description_.files = {reader_.name()};
-  description_.format =
-      fmt::format("Gmsh {}, {}", version4_ ? "4.1" : "2.2", reader_.isBinary() ? "binary" : "ASCII");
+  description_.format = fmt::format("Gmsh {}, {}", version_, reader_.isBinary() ? "binary" : "ASCII");
   description_.coordinate_bytes = 8;
   description_.pieces.push_back({"mesh", reader_.name(), node_tags_.count(), cells_});
   addFields(options.time_step);
 }
 
 void GmshSource::readFormat() {
-  reader_.requiredLine();
-  const double version = reader_.textNumber(), binary = reader_.textNumber(), bytes = reader_.textNumber();
-  version4_ = version == 4.1;
-  if (!version4_ && version != 2 && version != 2.1 && version != 2.2)
-    throw Error(
-        "{}: is a Gmsh mesh of version {}; expected 4.1 or 2.2: save it so (gmsh FILE -save -format msh41 -o "
-        "OUT.msh)",
-        reader_.name(), version);
-  if (binary == 1) {
-    if (bytes != 8) reader_.fail(fmt::format("has numbers of {} bytes; expected 8", bytes));
-    reader_.setBinary(false);
-    reader_.endLine();
-    if (const auto one = reader_.next<int32_t>(); one != 1) {
-      if (byteSwapped(static_cast<uint32_t>(one)) != 1) reader_.fail("has no 1 to tell its byte order");
-      reader_.setBinary(true);
-    }
-  }
-  reader_.skipTo("$EndMeshFormat");
+  const double version = readGmshFormat(reader_);
+  version4_ = version >= 4;
+  wide_ = version == 4.1;
+  version_ = fmt::format("{:.1f}", version4_ ? version : 2.2);
 }
 
 /// Reads nodes or elements. Gmsh appends views to a file with their mesh, which is passed over if it is the same again.
@@ -157,6 +153,19 @@ void GmshSource::readMesh(const std::string& section) {
   if (known.bytes == 0) known = {begin, bytes};
 }
 
+/// The number of the blocks that follow. Version 4.1 has the least and the largest number after that of all.
+uint64_t GmshSource::readBlocks() {
+  const uint64_t blocks = reader_.nextCount(true);
+  for (int n = 0; n < (wide_ ? 3 : 1); ++n) reader_.nextTag(true);
+  return blocks;
+}
+
+/// The dimension of a block's entity, which comes before its number in version 4.1.
+int GmshSource::readDimension() {
+  const auto first = reader_.next<int32_t>(), second = reader_.next<int32_t>();
+  return wide_ ? first : second;
+}
+
 void GmshSource::readNodes(bool parametric) {
   NumberSpool<double> places(place_spool_);
   const auto addPlace = [&](int parameters) {
@@ -164,17 +173,18 @@ void GmshSource::readNodes(bool parametric) {
     for (int n = 0; n < parameters; ++n) reader_.next<double>();
   };
   if (version4_) {
-    const uint64_t blocks = reader_.nextCount(true);
-    for (int n = 0; n < 3; ++n) reader_.nextTag(true);
+    const uint64_t blocks = readBlocks();
     for (uint64_t block = 0; block < blocks; ++block) {
-      const auto dimension = reader_.next<int32_t>();
-      reader_.next<int32_t>();
+      const int dimension = readDimension();
       const bool has_parameters = reader_.next<int32_t>() != 0;
       if (dimension < 0 || dimension > 3)
         reader_.fail(fmt::format("has an entity of {} dimensions", dimension));
       const uint64_t count = reader_.nextCount(true);
-      for (uint64_t n = 0; n < count; ++n) node_tags_.add(reader_.nextTag(true));
-      for (uint64_t n = 0; n < count; ++n) addPlace(has_parameters ? dimension : 0);
+      for (uint64_t n = 0; wide_ && n < count; ++n) node_tags_.add(reader_.nextTag(true));
+      for (uint64_t n = 0; n < count; ++n) {
+        if (!wide_) node_tags_.add(reader_.nextTag(false));
+        addPlace(has_parameters ? dimension : 0);
+      }
     }
   } else {
     const double count = reader_.textNumber();
@@ -203,12 +213,12 @@ const GmshElement& GmshSource::elementOf(int type) const {
 /// Adds an element with a volume, or passes over another one.
 void GmshSource::readElement(const GmshElement& element, uint64_t tag, NumberSpool<uint64_t>& nodes) {
   if (element.kind == CellKind::kNone) {
-    for (size_t n = 0; n < element.nodes; ++n) reader_.nextTag(version4_);
+    for (size_t n = 0; n < element.nodes; ++n) reader_.nextTag(wide_);
     return;
   }
   before_.swap(of_element_);
   of_element_.clear();
-  for (size_t n = 0; n < element.nodes; ++n) of_element_.push_back(reader_.nextTag(version4_));
+  for (size_t n = 0; n < element.nodes; ++n) of_element_.push_back(reader_.nextTag(wide_));
   // Version 2 has an element once for each of its physical groups, one after another, each with a number of its own.
   if (!version4_ && of_element_ == before_) {
     ++repeated_;
@@ -242,14 +252,12 @@ void GmshSource::readElements() {
   if (node_section_.bytes == 0) reader_.fail("has $Elements before $Nodes");
   NumberSpool<uint64_t> nodes(node_spool_);
   if (version4_) {
-    const uint64_t blocks = reader_.nextCount(true);
-    for (int n = 0; n < 3; ++n) reader_.nextTag(true);
+    const uint64_t blocks = readBlocks();
     for (uint64_t block = 0; block < blocks; ++block) {
-      reader_.next<int32_t>();
-      reader_.next<int32_t>();
+      readDimension();
       const GmshElement& element = elementOf(reader_.next<int32_t>());
       const uint64_t count = reader_.nextCount(true);
-      for (uint64_t n = 0; n < count; ++n) readElement(element, reader_.nextTag(true), nodes);
+      for (uint64_t n = 0; n < count; ++n) readElement(element, reader_.nextTag(wide_), nodes);
     }
   } else {
     const double count = reader_.textNumber();
@@ -378,6 +386,10 @@ bool isGmsh(const InputFile& file) {
   if (file.size() < begin.size()) return false;
   file.readAt(0, std::span(begin.data(), begin.size()));
   return begin == "$MeshFormat";
+}
+
+uint64_t gmshFiles(const std::filesystem::path& path) {
+  return isRegularFile(path) && isGmsh(InputFile(path)) ? gmshParts(path) : 1;
 }
 
 std::unique_ptr<DataSource> openGmsh(const OpenGridOptions& options) {

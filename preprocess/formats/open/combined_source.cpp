@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "preprocess/formats/exodus/exodus_names.h"
+#include "preprocess/formats/gmsh/gmsh_source.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -308,7 +309,8 @@ std::unique_ptr<DataSource> openCombined(
   one.solutions.clear();
   std::vector<std::string> names{options.grid.string()};
   for (const std::filesystem::path& path : options.solutions) names.push_back(path.string());
-  one.is_part = exodusName(options.grid).processors <= names.size();
+  one.is_part =
+      exodusName(options.grid).processors <= names.size() && gmshFiles(options.grid) <= names.size();
   std::vector<std::unique_ptr<GridSource>> grids;
   std::vector<std::unique_ptr<MeshSource>> meshes;
   for (const std::string& name : names) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "preprocess/formats/exodus/exodus_names.h"
+#include "preprocess/formats/gmsh/gmsh_source.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_names.h"
 #include "preprocess/formats/su2/su2_source.h"
@@ -69,6 +70,11 @@ bool areZones(const OpenGridOptions& options) {
   if (options.solutions.size() < 2 || !isRegularFile(options.grid)) return false;
   const InputFile mesh(options.grid);
   return isSu2(mesh) && su2Zones(mesh) == options.solutions.size();
+}
+
+/// Whether the names that differ in a number alone are not those of steps.
+bool areOneStep(const OpenGridOptions& options) {
+  return areZones(options) || (!options.solutions.empty() && gmshFiles(options.grid) > 1);
 }
 
 /// The files of a series as its steps use them.
@@ -197,14 +203,14 @@ void expandPatterns(OpenGridOptions& options) {
 }
 
 bool hasSeveralStepFiles(const OpenGridOptions& options) {
-  if (areZones(options)) return false;
+  if (areOneStep(options)) return false;
   std::vector<std::string> shapes = shapesOf(options);
   std::sort(shapes.begin(), shapes.end());
   return std::adjacent_find(shapes.begin(), shapes.end()) != shapes.end();
 }
 
 std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
-  if (areZones(options)) return {{options, options.grid.string()}};
+  if (areOneStep(options)) return {{options, options.grid.string()}};
   const Groups groups = groupsOf(options);
   std::vector<StepFiles> steps;
   for (size_t n = 0; n < groups.steps; ++n) {

@@ -12,7 +12,7 @@
 // have none there (r-5 r0 r5).
 //
 // As many restart files as a SU2 mesh has zones are one step, and so are the tiles of a cubed sphere (a.tile1.nc to
-// a.tile6.nc): of two such sets, those of the same number are the steps.
+// a.tile6.nc): of two such sets, those of the same number are the steps. Files that Gmsh saved for the partitions of a mesh are one step.
 #pragma once
 
 #include <cstdint>
@@ -50,11 +50,11 @@ std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelecti
 /// is a pattern, the first file becomes the grid, and the others come before the solutions.
 void expandPatterns(OpenGridOptions& options);
 
-/// Whether the names of the files make them several steps. Opens nothing but a SU2 mesh.
+/// Whether the names of the files make them several steps. Opens nothing but a mesh of SU2 or Gmsh.
 bool hasSeveralStepFiles(const OpenGridOptions& options);
 
 /// The steps that the names of the files tell; a file with several steps counts as one. Opens nothing but a
-/// SU2 mesh.
+/// mesh of SU2 or Gmsh.
 std::vector<StepFiles> stepsByName(const OpenGridOptions& options);
 
 /// The steps within one of these. Files that cannot be opened count as one step.
