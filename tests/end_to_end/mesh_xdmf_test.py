@@ -8,7 +8,7 @@ import os
 import sys
 import unittest
 
-from mesh_formats import HEXAHEDRON_FACES, Mesh, MeshFormats, np, vtk
+from mesh_formats import HEXAHEDRON_FACES, Mesh, MeshFormats, np, numpy_to_vtk, vtk, write_xml
 
 try:
     import h5py
@@ -186,30 +186,57 @@ class XdmfMeshes(MeshFormats):
         return (f'<Attribute ItemType="FiniteElementFunction" ElementFamily="{family}" ElementDegree="{degree}" ElementCell="tetrahedron" Name="{name}" '
                 f'Center="Other" AttributeType="{kind}">{"".join(map(self.item, items))}</Attribute>')
 
-    def test_functions_of_finite_elements(self):
-        mesh = Mesh(3, (4,))
+    def apart(self, mesh, points, values, kind):
+        """VTK's grid of cells with points of their own."""
+        grid = vtk.vtkUnstructuredGrid()
+        grid.Allocate(1)
+        each = points.shape[1]
+        for n in range(len(points)):
+            grid.InsertNextCell(kind, each, list(range(n * each, (n + 1) * each)))
+        at = vtk.vtkPoints()
+        at.SetData(numpy_to_vtk(points.reshape(-1, 3), deep=True))
+        grid.SetPoints(at)
+        for data, name, array in ((grid.GetPointData(), "p", values.ravel()), (grid.GetCellData(), "c", mesh.c)):
+            array = numpy_to_vtk(array, deep=True)
+            array.SetName(name)
+            data.AddArray(array)
+        return grid
+
+    # The edges as VTK has them, and where UFC, by which FEniCS numbers, has the degrees of freedom of a cell's ten points.
+    EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+    UFC = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
+
+    def ten_points(self, mesh):
+        """Of each cell its corners and the middles of its edges."""
+        corners = mesh.points[np.array(mesh.cells)]
+        return np.concatenate([corners, np.stack([(corners[:, a] + corners[:, b]) / 2 for a, b in self.EDGES], 1)], 1)
+
+    def by_ufc(self, values):
+        degrees = np.empty_like(values)
+        degrees[:, self.UFC] = values
+        return degrees[:, None, :]
+
+    def tetrahedra(self, n=3):
+        mesh = Mesh(n, (4,))
         cells = np.array(mesh.cells)
-        self.assertEqual(cells.shape[1], 4)
         grid = self.grid(mesh, ("Tetrahedron", len(cells), cells))
-        bare = grid[:grid.index("<Attribute")]
-        at_corners, edges = mesh.p[cells][:, None, :], self.RANDOM.random((len(cells), 1, 6))
-        for degree, family, values in ((1, "CG", at_corners), (1, "DG", at_corners), (2, "DG", np.concatenate([at_corners, edges], 2))):
-            with self.subTest(degree=degree, family=family):
-                functions = self.function("p", degree, family, values) + self.function("c", 0, "DG", mesh.c[:, None, None])
-                self.expect_same([self.write(bare + functions + "</Grid>")], mesh.vtk())
+        return mesh, cells, grid[:grid.index("<Attribute")]
+
+    def test_functions_of_finite_elements(self):
+        mesh, cells, bare = self.tetrahedra()
+        self.assertEqual(cells.shape[1], 4)
+        at_corners = mesh.p[cells][:, None, :]
+        functions = self.function("p", 1, "CG", at_corners) + self.function("c", 0, "DG", mesh.c[:, None, None])
+        self.expect_same([self.write(bare + functions + "</Grid>")], mesh.vtk())
         vector = self.RANDOM.random((len(mesh.points), 3))
         self.write(bare + self.function("v", 1, "CG", vector[cells].swapaxes(1, 2), "Vector") + "</Grid>")
         info = {scalar["name"]: scalar for scalar in self.info(self.path)["scalars"]}
         for axis, name in enumerate("xyz"):
             self.assertEqual(info[f"v:{name}"]["max"], np.float32(vector[:, axis].max()))
-        # Where cells differ, the mean.
+        # Values of the cells' own, which jump.
         jumps = self.RANDOM.random((len(cells), 1, 4))
-        sums, counts = np.zeros(len(mesh.points)), np.zeros(len(mesh.points))
-        np.add.at(sums, cells, jumps[:, 0])
-        np.add.at(counts, cells, 1)
-        info = self.info(self.write(bare + self.function("j", 1, "DG", jumps) + "</Grid>"))["scalars"][0]
-        self.assertAlmostEqual(info["max"], (sums / counts).max(), places=6)
-        self.assertAlmostEqual(info["min"], (sums / counts).min(), places=6)
+        functions = self.function("p", 1, "DG", jumps) + self.function("c", 0, "DG", mesh.c[:, None, None])
+        self.expect_same([self.write(bare + functions + "</Grid>")], self.apart(mesh, mesh.points[cells], jumps, vtk.VTK_TETRA))
         for family, degree in (("RT", 1), ("CG", 3)):
             info = self.info(self.write(bare + self.function("q", degree, family, at_corners) + "</Grid>"))
             self.assertIn(f"attribute q is a function of finite elements ({family} of degree {degree})", info["warnings"][0])
@@ -218,6 +245,54 @@ class XdmfMeshes(MeshFormats):
         with h5py.File(self.folder / "a.h5", "a") as f:
             f[str(self.count - 3)][5] = 10**6
         self.expect_line(self.write(text), scalar="p", words="has the degree of freedom 1000000")
+
+    def test_functions_of_second_degree(self):
+        """Cells are cut into eight, with values at the middles of their edges; functions of lower degree have theirs there, too."""
+        mesh, cells, bare = self.tetrahedra()
+        ten = self.ten_points(mesh)
+        rest = self.function("c", 0, "DG", mesh.c[:, None, None]) + self.function("r", 1, "CG", mesh.p[cells][:, None, :])
+        for family, values in (("CG", (ten**2).sum(2) - ten[:, :, 0] * ten[:, :, 1]), ("DG", self.RANDOM.random(ten.shape[:2]))):
+            with self.subTest(family=family):
+                path = self.write(bare + self.function("p", 2, family, self.by_ufc(values)) + rest + "</Grid>")
+                self.expect_same([path], self.apart(mesh, ten, values, vtk.VTK_QUADRATIC_TETRA))
+                info = self.info(path)
+                self.assertEqual((info["cells"]["count"], info["nodes"]), (8 * len(cells), 10 * len(cells)))
+        linear = mesh.points @ (1, 2, 3)
+        at_nodes = f'<Attribute Name="n" Center="Node">{self.item(linear)}</Attribute>'
+        self.write(bare + self.function("p", 2, "CG", self.by_ufc(ten @ (1.0, 2.0, 3.0))) + at_nodes + "</Grid>")
+        self.assertEqual(self.cache([self.path], "p"), self.cache([self.path], "n"))
+
+    def test_a_polynomial_of_second_degree(self):
+        """Probed at corners and at the middles of edges, where its own values are: those of the closed form, and not those of corners."""
+        mesh, cells, bare = self.tetrahedra(2)
+        field = lambda p: 3 * p[..., 0]**2 - 2 * p[..., 0] * p[..., 1] + p[..., 2]**2 + 5 * p[..., 1] * p[..., 2] + p[..., 2] + 1
+        ten = self.ten_points(mesh)
+        vector = np.stack([self.by_ufc(field(ten))[:, 0], self.by_ufc(ten[:, :, 0]**2)[:, 0]], 1)
+        self.write(bare + self.function("p", 2, "CG", self.by_ufc(field(ten))) + self.function("v", 2, "CG", vector, "Vector") + "</Grid>")
+        inside = ten.reshape(-1, 3)[(ten.reshape(-1, 3) > 0).all(1) & (ten.reshape(-1, 3) < 1).all(1)]
+        points = self.folder / "points.txt"
+        np.savetxt(points, inside, delimiter=",")
+        for name, exact in (("p", field(inside)), ("v:y", inside[:, 0]**2)):
+            cache = self.convert([self.path], name)
+            result = self.run_program("info", cache, "--probe", points, "--source", self.path)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            found = np.array([[float(word) for word in line.split(",")] for line in result.stdout.splitlines()[1:]])
+            np.testing.assert_allclose(found[:, 3], exact, atol=1e-6)
+
+    def test_functions_in_curved_tetrahedra(self):
+        """A mesh of degree 2: its own ten points are taken."""
+        mesh, cells, _ = self.tetrahedra(2)
+        ten = self.ten_points(mesh)
+        flat, numbers = np.unique(ten.reshape(-1, 3).round(9), axis=0, return_inverse=True)
+        bent = flat + 0.05 * np.sin(9 * flat[:, [1, 2, 0]]) * np.isin(flat, (0.25, 0.75)).any(1)[:, None]
+        curved = Mesh(2, (4,))
+        curved.points, curved.cells, curved.c, curved.p = bent, list(numbers.reshape(-1, 10)), mesh.c, bent[:, 0]
+        grid = self.grid(curved, ("Tetrahedron_10", len(cells), np.array(curved.cells)))
+        values = bent[np.array(curved.cells)] @ (1.0, -2.0, 1.0)
+        path = self.write(grid[:grid.index("<Attribute")] + self.function("p", 2, "DG", self.by_ufc(values)) + "</Grid>")
+        expected = self.folder / "expected.vtu"
+        write_xml(self.apart(mesh, bent[np.array(curved.cells)], values, vtk.VTK_QUADRATIC_TETRA), expected)
+        self.expect_same_caches([path], expected, {"c": None})
 
     def test_what_is_refused(self):
         mesh = Mesh(2, (8,))

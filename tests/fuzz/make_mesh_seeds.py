@@ -19,7 +19,7 @@ from vtk.util.numpy_support import numpy_to_vtk
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "end_to_end"))
 from cgns_library import ADF, CELL_CENTER, HEXA_8, VERTEX, CgnsFile
-from gmsh_files import Msh
+from gmsh_files import PYRAMIDS, Msh, lattice_of
 from tecplot_files import Binary, padded, write_text
 from zarr_stores import Store
 
@@ -202,6 +202,14 @@ def gmsh_seeds():
         file = Msh(of, version, order, tags=np.arange(12)[::-1] * 2 + 1 if order == ">" else np.arange(12) + 1).mesh()
         file.data("p", np.arange(12.0)).data("p", np.arange(12.0), time=1.0).data("v", np.arange(3 * of.GetNumberOfCells()).reshape(-1, 3) * 1.0, "Element")
         put("gmsh", f"{version}{order.replace('<', 'little').replace('>', 'big') or 'text'}", b"".join(file.out))
+    for name, version, order, partition in (("4.0little", 4, "<", None), ("4.0text", 4, "", None), ("partition_little", 4.1, "<", (2, 3)), ("partition_text", 4.1, "", (1, 2))):
+        put("gmsh", name, b"".join(Msh(of, version, order, partition=partition).mesh().data("p", np.arange(12.0)).out))
+    pyramid = vtk.vtkUnstructuredGrid()
+    pyramid.SetPoints(vtk.vtkPoints())
+    for place in lattice_of(3, PYRAMIDS[3][1]):
+        pyramid.GetPoints().InsertNextPoint(place)
+    pyramid.InsertNextCell(vtk.VTK_LAGRANGE_PYRAMID, 30, list(range(30)))
+    put("gmsh", "pyramid", b"".join(Msh(pyramid, kinds={vtk.VTK_LAGRANGE_PYRAMID: (PYRAMIDS[3][0], range(30))}).mesh().out))
 
 
 def vtk_hdf_seeds():
@@ -447,6 +455,10 @@ def xdmf_seeds():
         f'<Attribute Name="c" Center="Cell">{item.format(count, words(np.arange(count)))}</Attribute></Grid>')
     faces = [v for face in FACES for v in (4, *CELLS[0][list(face)])]
     put("xdmf", "mesh", f'{head}{mesh("Hexahedron", 2, np.ravel(CELLS))}{mesh("Tetrahedron_10", 1, np.arange(10))}</Domain></Xdmf>'.encode())
+    degrees = lambda degree, each, parts: (f'<Attribute ItemType="FiniteElementFunction" ElementFamily="DG" ElementDegree="{degree}" ElementCell="tetrahedron" Name="d{degree}">'
+        f'{item.format(f"{parts} {each}", words(np.arange(parts * each) % 11))}{item.format("11 1", words(np.arange(11)))}</Attribute>')
+    tetrahedra = mesh("Tetrahedron", 2, [0, 1, 2, 4, 1, 3, 2, 4]).replace("</Grid>", degrees(0, 1, 2) + degrees(1, 4, 2) + degrees(2, 30, 2) + "</Grid>")
+    put("xdmf", "functions", f"{head}{tetrahedra}</Domain></Xdmf>".encode())
     put("xdmf", "mixed_mesh", f'{head}{mesh("Mixed", 5, [9, *CELLS[0], 1, 2, 5, 6, 2, 3, 7, 8, 9, 6, 4, 5, 6, 8, 16, 6, *faces])}</Domain></Xdmf>'.encode())
 
 

@@ -249,6 +249,7 @@ class Reader {
         (cells.nodes_each > 0 && cells.connectivity->size() % cells.nodes_each != 0))
       throw Error("{} has {} numbers, which are {} cells; expected {}", document_.describe(topology),
                   cells.connectivity->size(), cells.count, expected);
+    takeCellsApart(node, grid);
     for (const pugi::xml_node attribute : node.children("Attribute"))
       readAttribute(document_.resolved(attribute), grid);
   }
@@ -357,33 +358,79 @@ class Reader {
     }
   }
 
-  static std::string degreeOf(const pugi::xml_node& function) {
-    return xdmfAttribute(function, {"ElementDegree"});
+  /// A function of finite elements.
+  struct Function {
+    std::string family, degree;
+
+    bool isRead(const XdmfCells& cells) const {
+      return cells.shape == CellKind::kTetrahedron && (cells.nodes_each == 4 || cells.nodes_each == 10) &&
+             (family == "CG" || family == "DG") && (degree == "0" || degree == "1" || degree == "2");
+    }
+    /// The values of a component in a cell.
+    uint64_t each() const { return degree == "0" ? 1 : degree == "1" ? 4 : 10; }
+  };
+
+  static std::optional<Function> functionOf(const pugi::xml_node& attribute) {
+    if (xdmfAttribute(attribute, {"ItemType"}) != "FiniteElementFunction") return std::nullopt;
+    return Function{xdmfAttribute(attribute, {"ElementFamily"}), xdmfAttribute(attribute, {"ElementDegree"})};
+  }
+
+  /// Gives each cell points of its own where a function jumps between cells, or has values between their corners.
+  void takeCellsApart(const pugi::xml_node& node, XdmfGrid& grid) {
+    XdmfCells& cells = grid.cells;
+    for (const pugi::xml_node attribute : node.children("Attribute")) {
+      const auto function = functionOf(document_.resolved(attribute));
+      if (function && function->isRead(cells) && function->each() > 1 &&
+          (function->family == "DG" || function->degree == "2" || cells.nodes_each > 4))
+        cells.own_points = std::max({cells.own_points, cells.nodes_each, function->each()});
+    }
+    if (cells.own_points == 0) return;
+    const std::string where = document_.describe(node);
+    const std::vector<std::shared_ptr<const XdmfValues>> all(grid.places.begin(), grid.places.end());
+    cells.curved = cells.own_points > 4;
+    nodes_of_file_ = grid.nodes[0];
+    grid.places[0] = ofNodes(
+        grid, grid.kind == XdmfGrid::Kind::kSeparate ? xdmfJoined(all, where) : grid.places[0], 3, where);
+    grid.kind = XdmfGrid::Kind::kPoints;
+    grid.nodes[0] = cells.count * cells.own_points;
+  }
+
+  /// Values at nodes, for the points of cells that have points of their own.
+  std::shared_ptr<const XdmfValues> ofNodes(const XdmfGrid& grid, std::shared_ptr<const XdmfValues> values,
+                                            uint64_t components, const std::string& where) const {
+    const XdmfCells& cells = grid.cells;
+    return xdmfOfCells({cells.count, cells.nodes_each, components, cells.connectivity, true,
+                        cells.first_point, std::move(values), where},
+                       cells.own_points, values_);
   }
 
   /// The values of a function of finite elements; null, with a warning, if it is of a kind that is not read.
-  std::shared_ptr<const XdmfValues> readFunction(const pugi::xml_node& node, const std::string& name,
-                                                 const XdmfGrid& grid) {
-    const std::string family = xdmfAttribute(node, {"ElementFamily"}), degree = degreeOf(node);
-    const bool known =
-        (family == "CG" || family == "DG") && (degree == "0" || degree == "1" || degree == "2");
-    const bool linear = grid.cells.shape == CellKind::kTetrahedron && grid.cells.nodes_each == 4;
+  std::shared_ptr<const XdmfValues> readFunction(const pugi::xml_node& node, const Function& function,
+                                                 const std::string& name, const XdmfGrid& grid) {
+    const XdmfCells& cells = grid.cells;
     std::vector<std::shared_ptr<const XdmfValues>> items;
     for (const pugi::xml_node item : node.children("DataItem"))
       if (items.size() < 2) items.push_back(items_.read(item));
-    if (!known || !linear || items.size() < 2) {
-      warn(
-          fmt::format("attribute {} is a function of finite elements ({} of degree {}), which is read in "
-                      "linear tetrahedra, for CG and DG "
-                      "of degree 0 to 2; it is left out",
-                      name, printable(family.substr(0, 40)), printable(degree.substr(0, 40))));
+    if (!function.isRead(cells) || items.size() < 2) {
+      warn(fmt::format(
+          "attribute {} is a function of finite elements ({} of degree {}), which is read in "
+          "tetrahedra, for CG and DG "
+          "of degree 0 to 2; it is left out",
+          name, printable(function.family.substr(0, 40)), printable(function.degree.substr(0, 40))));
       return nullptr;
     }
-    if (degree == "2") warn(fmt::format("attribute {} is of degree 2; its values at corners are read", name));
-    return xdmfFunctionValues(
-        {grid.nodes[0], grid.cells.count, grid.cells.connectivity, grid.cells.first_point, items[0], items[1],
-         static_cast<uint64_t>(degree[0] - '0'), family == "CG", document_.describe(node)},
-        values_);
+    constexpr uint64_t kMaxComponents = 9;
+    const uint64_t each = function.each(), components = items[0]->size() / (cells.count * each);
+    if (components == 0 || components > kMaxComponents || components * each * cells.count != items[0]->size())
+      throw Error("{} has {} degrees of freedom in {} cells; expected {} in each, or some times as many",
+                  document_.describe(node), items[0]->size(), cells.count, each);
+    const XdmfCellNumbers numbers{cells.count, each,
+                                  components,  items[0],
+                                  false,       cells.first_point,
+                                  items[1],    document_.describe(node)};
+    if (each > 1 && cells.own_points == 0)
+      return xdmfAtNodes(numbers, grid.nodes[0], cells.connectivity, values_);
+    return xdmfOfCells(numbers, each == 1 ? 1 : cells.own_points, values_);
   }
 
   void readAttribute(const pugi::xml_node& node, XdmfGrid& grid) {
@@ -391,10 +438,11 @@ class Reader {
     attribute.name = xdmfAttribute(node, {"Name"});
     if (attribute.name.empty()) attribute.name = fmt::format("attribute {}", grid.attributes.size() + 1);
     std::string centre = lowerCase(xdmfAttribute(node, {"Center"}));
-    if (xdmfAttribute(node, {"ItemType"}) == "FiniteElementFunction") {
-      attribute.values = readFunction(node, attribute.name, grid);
+    const auto function = functionOf(node);
+    if (function) {
+      attribute.values = readFunction(node, *function, attribute.name, grid);
       if (!attribute.values) return;
-      centre = degreeOf(node) == "0" ? "cell" : "node";
+      centre = function->degree == "0" ? "cell" : "node";
     }
     if (!centre.empty() && centre != "node" && centre != "cell") {
       warn(fmt::format("attribute {} belongs to each {}; it is left out", attribute.name, centre));
@@ -410,8 +458,9 @@ class Reader {
       return;
     }
     const uint64_t less = attribute.centring == Centring::kCell && grid.cells.count == 0 ? 1 : 0;
-    const uint64_t samples = attribute.centring == Centring::kCell && less == 0
-                                 ? grid.cells.count
+    const uint64_t samples = attribute.centring == Centring::kCell && less == 0 ? grid.cells.count
+                             : grid.cells.own_points > 0 && !function
+                                 ? nodes_of_file_
                                  : (grid.nodes[0] - less) * (grid.nodes[1] - less) * (grid.nodes[2] - less);
     attribute.components = attribute.values->size() / samples;
     constexpr uint64_t kMaxComponents = 4096;
@@ -419,6 +468,8 @@ class Reader {
         attribute.components > kMaxComponents)
       throw Error("{} has {} numbers; expected {}, or some times as many", document_.describe(node),
                   attribute.values->size(), samples);
+    if (grid.cells.own_points > 0 && attribute.centring == Centring::kNode && !function)
+      attribute.values = ofNodes(grid, attribute.values, attribute.components, document_.describe(node));
     if (!attributes_of_grid_.emplace(attribute.name, attribute.centring).second)
       warn(fmt::format("a second attribute {} is ignored", attribute.name));
     else
@@ -440,6 +491,7 @@ class Reader {
   std::set<std::pair<std::string, Centring>> attributes_of_grid_;
   std::set<std::string> warned_;
   size_t visited_ = 0;
+  uint64_t nodes_of_file_ = 0;  // of the grid whose cells have points of their own
   XdmfFile file_;
 };
 

@@ -39,6 +39,7 @@ struct XdmfCells {
   CellKind shape = CellKind::kNone;
   uint64_t nodes_each = 0;  // 0: Mixed
   bool curved = false;      // some have more nodes than corners
+  uint64_t own_points = 0;  // not 0: that many of each cell, one cell after another, are the grid's points
   double first_point = 0;   // number of the first point (BaseOffset)
   std::shared_ptr<const XdmfValues> connectivity;
   SpooledNumbers begins;  // of Mixed: where each cell begins among the numbers, and the end of the last

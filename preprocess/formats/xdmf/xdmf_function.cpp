@@ -1,9 +1,11 @@
 #include "preprocess/formats/xdmf/xdmf_function.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "preprocess/formats/common/element_source.h"
@@ -13,23 +15,24 @@ namespace curvisplat {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr uint64_t kCorners = 4, kMaxComponents = 9;
+constexpr uint64_t kCorners = 4;
 constexpr uint64_t kSamplesAtOnce = 1 << 20, kNumbersAtOnce = 1 << 18, kMaxGap = 512;
 
-uint64_t degreesOf(uint64_t degree) {
-  return (degree + 1) * (degree + 2) * (degree + 3) / 6;
-}
+/// The ends of the edges in VTK's order, and where UFC, by which FEniCS numbers, has the degrees of freedom of all ten points.
+constexpr std::array<std::array<size_t, 2>, 6> kEdges{{{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}};
+constexpr std::array<size_t, 10> kDegreeOfPoint{0, 1, 2, 3, 9, 6, 8, 7, 5, 4};
 
-/// Replaces indices of `values` by these values.
-void look(const XdmfFunction& function, std::vector<double>& indices) {
+/// Replaces indices of the values by these values.
+void look(const XdmfCellNumbers& of, std::vector<double>& indices) {
   std::vector<size_t> order(indices.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return indices[a] < indices[b]; });
   const auto indexAt = [&](size_t n) {
     const uint64_t index = pointNumber(indices[order[n]]);
-    if (index >= function.values->size())
-      throw Error("{} has the degree of freedom {}; expected one below {}; the file is damaged",
-                  function.where, indices[order[n]], function.values->size());
+    if (index >= of.values->size())
+      throw Error("{} has the {} {}; expected one below {}; the file is damaged", of.where,
+                  of.of_nodes ? "coordinate or value" : "degree of freedom", indices[order[n]],
+                  of.values->size());
     return index;
   };
   std::vector<double> run;
@@ -39,90 +42,132 @@ void look(const XdmfFunction& function, std::vector<double>& indices) {
     size_t to = from + 1;
     for (; to < order.size() && indexAt(to) - end < kMaxGap; ++to) end = indexAt(to) + 1;
     run.resize(end - begin);
-    function.values->read(begin, run);
+    of.values->read(begin, run);
     for (; from < to; ++from) indices[order[from]] = run[indexAt(from) - begin];
   }
 }
 
-class FunctionValues final : public XdmfValues {
- public:
-  FunctionValues(const XdmfFunction& function, uint64_t components, const std::shared_ptr<SpoolFile>& spool)
-      : XdmfValues({function.degree == 0 ? function.cells : function.nodes, components}, function.where),
-        function_(function),
-        bytes_(spool, size() * sizeof(double), [this](const SpoolFile::Sink& sink) { write(sink); }) {}
+/// Numbers of the file that a cell has.
+uint64_t numbersOfCell(const XdmfCellNumbers& of) {
+  return of.of_nodes ? of.given : of.given * of.components;
+}
 
-  int valueBytes() const override { return function_.values->valueBytes(); }
+uint64_t cellsAtOnce(const XdmfCellNumbers& of) {
+  return std::max<uint64_t>(1, kNumbersAtOnce / (of.given * of.components));
+}
+
+/// The values of some cells, [cell][component][given].
+std::vector<double> readCells(const XdmfCellNumbers& of, uint64_t first, uint64_t count) {
+  std::vector<double> indices(count * numbersOfCell(of));
+  of.numbers->read(first * numbersOfCell(of), indices);
+  if (of.of_nodes) {
+    std::vector<double> of_tuples;
+    const auto components = static_cast<double>(of.components);
+    for (uint64_t cell = 0; cell < count; ++cell)
+      for (double c = 0; c < components; ++c)
+        for (uint64_t n = 0; n < of.given; ++n)
+          of_tuples.push_back((indices[cell * of.given + n] - of.first_node) * components + c);
+    indices.swap(of_tuples);
+  }
+  look(of, indices);
+  return indices;
+}
+
+/// Values that are computed at the first read.
+class SpooledValues : public XdmfValues {
+ public:
+  int valueBytes() const override { return of_.values->valueBytes(); }
   void read(uint64_t first, std::span<double> to) const override {
     bytes_.readAt(first * sizeof(double), std::as_writable_bytes(to));
   }
 
+ protected:
+  SpooledValues(const XdmfCellNumbers& of, uint64_t samples, const std::shared_ptr<SpoolFile>& spool)
+      : XdmfValues({samples, of.components}, of.where),
+        of_(of),
+        bytes_(spool, size() * sizeof(double), [this](const SpoolFile::Sink& sink) { write(sink); }) {}
+  virtual void write(const SpoolFile::Sink& sink) const = 0;
+
+  const XdmfCellNumbers of_;
+
  private:
-  /// A part of the samples: sums of what cells have there.
-  struct Part {
-    uint64_t first = 0, count = 0;
-    std::vector<double> sums;
-    std::vector<uint32_t> added;
-  };
-
-  void write(const SpoolFile::Sink& sink) const {
-    const uint64_t samples = dims()[0], components = dims()[1], cells = function_.cells;
-    const uint64_t at_once = std::max<uint64_t>(1, kNumbersAtOnce / (function_.degrees->size() / cells));
-    Part part;
-    for (; part.first < samples; part.first += part.count) {
-      part.count = std::min(kSamplesAtOnce, samples - part.first);
-      part.sums.assign(part.count * components, kNaN);
-      part.added.assign(part.count, 0);
-      for (uint64_t cell = 0; cell < cells; cell += at_once)
-        addCells(cell, std::min(at_once, cells - cell), part);
-      for (size_t n = 0; n < part.sums.size(); ++n) part.sums[n] /= std::max(1U, part.added[n / components]);
-      sink(std::as_bytes(std::span(part.sums)));
-    }
-  }
-
-  void addCells(uint64_t first, uint64_t count, Part& part) const {
-    const uint64_t components = dims()[1], each = function_.degrees->size() / function_.cells;
-    const uint64_t corners = function_.degree == 0 ? 1 : kCorners, of_component = each / components;
-    std::vector<double> nodes(count * kCorners), degrees(count * each), values;
-    if (function_.degree > 0) function_.corners->read(first * kCorners, nodes);
-    function_.degrees->read(first * each, degrees);
-    std::vector<uint64_t> samples;  // of the part; each has a value of each component
-    for (uint64_t cell = 0; cell < count; ++cell)
-      for (uint64_t corner = 0; corner < corners; ++corner) {
-        const uint64_t sample = function_.degree == 0
-                                    ? first + cell
-                                    : pointNumber(nodes[cell * kCorners + corner], function_.first_node);
-        if (sample < part.first || sample - part.first >= part.count) continue;
-        samples.push_back(sample - part.first);
-        for (uint64_t component = 0; component < components; ++component)
-          values.push_back(degrees[cell * each + component * of_component + corner]);
-      }
-    look(function_, values);
-    for (size_t n = 0; n < samples.size(); ++n) {
-      uint32_t& added = part.added[samples[n]];
-      if (function_.continuous && added > 0) continue;  // all cells have the same there
-      for (uint64_t component = 0; component < components; ++component) {
-        double& sum = part.sums[samples[n] * components + component];
-        sum = values[n * components + component] + (added == 0 ? 0 : sum);
-      }
-      ++added;
-    }
-  }
-
-  const XdmfFunction function_;
   const SpooledBytes bytes_;
+};
+
+class ValuesOfCells final : public SpooledValues {
+ public:
+  ValuesOfCells(const XdmfCellNumbers& of, uint64_t points, const std::shared_ptr<SpoolFile>& spool)
+      : SpooledValues(of, of.cells * points, spool), points_(points) {}
+
+ private:
+  void write(const SpoolFile::Sink& sink) const override {
+    std::vector<double> out;
+    for (uint64_t first = 0; first < of_.cells; first += cellsAtOnce(of_)) {
+      const uint64_t count = std::min(cellsAtOnce(of_), of_.cells - first);
+      const std::vector<double> values = readCells(of_, first, count);
+      out.clear();
+      for (uint64_t cell = 0; cell < count; ++cell)
+        for (size_t point = 0; point < points_; ++point)
+          for (uint64_t c = 0; c < of_.components; ++c)
+            out.push_back(
+                at(std::span(values).subspan((cell * of_.components + c) * of_.given, of_.given), point));
+      sink(std::as_bytes(std::span(out)));
+    }
+  }
+
+  double at(std::span<const double> of_cell, size_t point) const {
+    if (of_.given == kDegreeOfPoint.size()) return of_cell[of_.of_nodes ? point : kDegreeOfPoint[point]];
+    if (point < of_.given) return of_cell[point];
+    const auto& [a, b] = kEdges[point - kCorners];
+    return (of_cell[a] + of_cell[b]) / 2;  // with the same bits from all cells at the edge
+  }
+
+  const uint64_t points_;
+};
+
+class ValuesAtNodes final : public SpooledValues {
+ public:
+  ValuesAtNodes(const XdmfCellNumbers& of, uint64_t nodes, std::shared_ptr<const XdmfValues> corners,
+                const std::shared_ptr<SpoolFile>& spool)
+      : SpooledValues(of, nodes, spool), corners_(std::move(corners)) {}
+
+ private:
+  void write(const SpoolFile::Sink& sink) const override {
+    const uint64_t nodes = dims()[0], components = of_.components;
+    std::vector<double> part, corners;
+    for (uint64_t begin = 0; begin < nodes; begin += kSamplesAtOnce) {
+      const uint64_t end = std::min(begin + kSamplesAtOnce, nodes);
+      part.assign((end - begin) * components, kNaN);
+      for (uint64_t first = 0; first < of_.cells; first += cellsAtOnce(of_)) {
+        const uint64_t count = std::min(cellsAtOnce(of_), of_.cells - first);
+        corners.resize(count * kCorners);
+        corners_->read(first * kCorners, corners);
+        const std::vector<double> values = readCells(of_, first, count);
+        for (size_t n = 0; n < corners.size(); ++n) {
+          const uint64_t node = pointNumber(corners[n], of_.first_node);
+          for (uint64_t c = 0; node >= begin && node < end && c < components; ++c)
+            part[(node - begin) * components + c] =
+                values[(n / kCorners * components + c) * kCorners + n % kCorners];
+        }
+      }
+      sink(std::as_bytes(std::span(part)));
+    }
+  }
+
+  const std::shared_ptr<const XdmfValues> corners_;
 };
 
 }  // namespace
 
-std::shared_ptr<const XdmfValues> xdmfFunctionValues(const XdmfFunction& function,
-                                                     const std::shared_ptr<SpoolFile>& spool) {
-  const uint64_t each = function.cells == 0 ? 0 : function.degrees->size() / function.cells,
-                 components = each / degreesOf(function.degree);
-  if (components == 0 || components > kMaxComponents ||
-      components * degreesOf(function.degree) * function.cells != function.degrees->size())
-    throw Error("{} has {} degrees of freedom in {} cells; expected {} in each, or some times as many",
-                function.where, function.degrees->size(), function.cells, degreesOf(function.degree));
-  return std::make_shared<FunctionValues>(function, components, spool);
+std::shared_ptr<const XdmfValues> xdmfOfCells(const XdmfCellNumbers& cells, uint64_t points,
+                                              const std::shared_ptr<SpoolFile>& spool) {
+  return std::make_shared<ValuesOfCells>(cells, points, spool);
+}
+
+std::shared_ptr<const XdmfValues> xdmfAtNodes(const XdmfCellNumbers& cells, uint64_t nodes,
+                                              const std::shared_ptr<const XdmfValues>& corners,
+                                              const std::shared_ptr<SpoolFile>& spool) {
+  return std::make_shared<ValuesAtNodes>(cells, nodes, corners, spool);
 }
 
 }  // namespace curvisplat

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <string>
 #include <tuple>
@@ -243,9 +244,17 @@ void XdmfMesh::appendCells(uint32_t piece, uint64_t first, uint64_t count, MeshC
   const uint64_t each = grid.cells.nodes_each;
   if (count == 0) return;
   if (each == 0) return appendMixed(file_.files.front(), grid, first, count, out);
+  std::vector<uint64_t> points(each);
+  if (const uint64_t own = grid.cells.own_points; own > 0) {
+    points.resize(own);
+    for (uint64_t cell = first; cell < first + count; ++cell) {
+      std::iota(points.begin(), points.end(), cell * own);
+      appendCurved(grid.cells.shape, points, out);
+    }
+    return;
+  }
   std::vector<double> numbers(count * each);
   grid.cells.connectivity->read(first * each, numbers);
-  std::vector<uint64_t> points(each);
   for (uint64_t n = 0; n < count; ++n) {
     for (uint64_t node = 0; node < each; ++node)
       points[node] = pointNumber(numbers[n * each + node], grid.cells.first_point);
