@@ -73,6 +73,7 @@ GridSurvey MeshOrigin::survey(Progress& progress) {
   used_ = std::move(survey.used);
   drawn_cells_ = survey.drawn_cells;
   chunk_bytes_ = survey.chunk_bytes;
+  open_polyhedra_ = warningOfOpenPolyhedra(survey);
   numbers_.emplace(reader_, plan_.mesh_bytes / 2, scratch_, progress);
   return survey.grid;
 }
@@ -83,6 +84,7 @@ std::vector<std::string> MeshOrigin::warnings() {
   if (unused > 0)
     warnings.push_back(
         fmt::format("{} of {} points belong to no solid cell and are left out", unused, reader_.points()));
+  if (!open_polyhedra_.empty()) warnings.push_back(open_polyhedra_);
   return warnings;
 }
 
@@ -160,6 +162,15 @@ void widen(ScalarRange& range, float value) {
 
 }  // namespace
 
+std::string warningOfOpenPolyhedra(const MeshSurvey& survey) {
+  if (survey.open_polyhedra == 0) return "";
+  return fmt::format(
+      "{} of {} polyhedra do not close, the first is cell {}: an edge belongs to one of their faces alone; "
+      "their "
+      "volumes may be wrong",
+      survey.open_polyhedra, survey.cells_of[static_cast<size_t>(CellKind::kPolyhedron)], survey.first_open);
+}
+
 MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
   MeshSurvey survey;
   GridSurvey& grid = survey.grid;
@@ -177,6 +188,9 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
       ++survey.cells_of[static_cast<size_t>(cells.shapes[n])];
       if (cells.shapes[n] == CellKind::kNone) continue;
       ++survey.drawn_cells;
+      if (cells.shapes[n] == CellKind::kPolyhedron && !isClosed(cells.facesOfCell(n)) &&
+          survey.open_polyhedra++ == 0)
+        survey.first_open = loaded.range.number + n;
       for (const uint64_t corner : cells.cornersOfCell(n))
         survey.used[first_points[loaded.range.piece] + corner] = true;
       for (size_t scalar = 0; scalar < cells.scalars.size(); ++scalar)

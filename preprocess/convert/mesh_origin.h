@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "preprocess/convert/memory_plan.h"
@@ -61,6 +62,7 @@ class MeshOrigin final : public SplatOrigin {
   std::optional<PointNumbers> numbers_;
   std::vector<bool> used_;  // [point]: a cell that is drawn has it
   uint64_t drawn_cells_ = 0, chunk_bytes_ = 0;
+  std::string open_polyhedra_;  // warningOfOpenPolyhedra()
 };
 
 /// The contents of an unstructured grid.
@@ -68,12 +70,16 @@ struct MeshSurvey {
   GridSurvey grid;                     // samples: points or cells, as the reader's scalars are
   std::array<uint64_t, 6> cells_of{};  // [CellKind]; kNone: hidden ones and those that are not solid
   uint64_t drawn_cells = 0, unused_points = 0;
-  uint64_t chunk_bytes = 0;  // of the largest chunk of cells that was read
-  std::vector<bool> used;    // [point]: a cell that is drawn has it
+  uint64_t open_polyhedra = 0, first_open = 0;  // those that are not isClosed(), and the number of the first
+  uint64_t chunk_bytes = 0;                     // of the largest chunk of cells that was read
+  std::vector<bool> used;                       // [point]: a cell that is drawn has it
 };
 
 /// The first pass, for conversion and for `info`: reads cells, then points. Memory: a bit a point and a few
 /// chunks. Throws Error if the files are damaged or if nothing is drawn. Does not depend on threads.
 MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress);
+
+/// Empty if all polyhedra are closed.
+std::string warningOfOpenPolyhedra(const MeshSurvey& survey);
 
 }  // namespace curvisplat

@@ -21,7 +21,7 @@ try:
 
     from sweep import some_of
     from mesh_case import PROGRAM, MeshCase
-    from mesh_cubes import RANDOM, cube, hexahedra, insert, lattice, with_scalars, write_legacy, write_xml
+    from mesh_cubes import HEXAHEDRON_FACES, RANDOM, cube, hexahedra, insert, lattice, with_scalars, write_legacy, write_xml
 except ModuleNotFoundError as error:
     print(f"skipped: {error}; install python3-vtk9 and python3-numpy")
     sys.exit(77)
@@ -373,6 +373,30 @@ class MeshFiles(MeshCase):
         newer.write_text(text.replace("</Cells>", added + "</Cells>"))
         self.assertNotIn('"faces"', newer.read_text())
         self.assertEqual(self.cache([newer], "c"), self.cache([path], "c"))
+
+    def test_polyhedra_that_do_not_close(self):
+        """A cell of which a face is missing: info and convert say so, with its number."""
+        for left_out in (0, 1):
+            grid = vtk.vtkUnstructuredGrid()
+            points = vtk.vtkPoints()
+            for point in [(i, j, k) for k in range(3) for j in range(2) for i in range(2)]:
+                points.InsertNextPoint(point)
+            grid.SetPoints(points)
+            for n, faces in enumerate((HEXAHEDRON_FACES, HEXAHEDRON_FACES[left_out:])):
+                corners = np.array([0, 1, 3, 2, 4, 5, 7, 6]) + 4 * n
+                ids = vtk.vtkIdList()
+                for word in (len(faces), *(word for face in faces for word in (len(face), *corners[list(face)]))):
+                    ids.InsertNextId(int(word))
+                grid.InsertNextCell(vtk.VTK_POLYHEDRON, ids)
+            values = numpy_to_vtk(np.arange(2.0), deep=True)
+            values.SetName("c")
+            grid.GetCellData().AddArray(values)
+            path = self.folder / "open.vtu"
+            write_xml(grid, path)
+            words = "1 of 2 polyhedra do not close, the first is cell 1"
+            self.assertEqual(words in " ".join(self.info(path)["warnings"]), left_out == 1)
+            done = self.run_program("convert", path, "-o", self.folder / "open.splats", "--overwrite")
+            self.assertEqual((done.returncode, done.stderr.count(words)), (0, left_out), done.stderr)
 
     def test_prisms_over_polygons(self):
         for sides, kind in ((5, vtk.VTK_PENTAGONAL_PRISM), (6, vtk.VTK_HEXAGONAL_PRISM)):

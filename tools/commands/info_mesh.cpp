@@ -122,6 +122,8 @@ MeshInfo inspect(const MeshSource& source) {
   measure(source, Centring::kNode, info);
   measure(source, Centring::kCell, info);
   info.warnings = info.description->warnings;
+  if (std::string open = warningOfOpenPolyhedra(info.survey); !open.empty())
+    info.warnings.push_back(std::move(open));
   std::vector<uint32_t> scalars(info.ranges.size());
   std::iota(scalars.begin(), scalars.end(), 0);
   for (std::string& warning : warningsOfRanges(source, scalars, info.ranges))
