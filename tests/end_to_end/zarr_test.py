@@ -274,6 +274,7 @@ class ZarrStores(ModelFileTest):
     def test_refusals(self):
         for version, change, words in (
                 (2, self.edit("temp/.zarray", compressor={"id": "bz2"}), "is stored with the codec 'bz2', which is not read; write it with zlib"),
+                (2, self.edit("temp/.zarray", compressor={"id": "lzma"}), "is stored with the codec 'lzma', which is not read; write it with zlib"),
                 (2, self.edit("temp/.zarray", filters=[{"id": "delta"}]), "codec 'delta'"),
                 (2, self.edit("temp/.zarray", filters=[{"id": "delta", "dtype": "<f8"}]), "codec 'delta'"),
                 (2, self.edit("temp/.zarray", filters=[{"id": "crc32"}]), "has a wrong checksum"),
