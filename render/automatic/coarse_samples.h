@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/coarse_level.h"
 
 namespace curvisplat {
 
@@ -26,9 +27,6 @@ struct CoarseSamples {
 
   size_t size() const { return values.size(); }
 };
-
-/// The bricks of the coarsest level with at least `min_splats` splats, including leaves above that level.
-std::vector<uint32_t> bricksAtALevel(const CacheReader& cache, uint64_t min_splats);
 
 /// The range that a choice is made for: the step that the reader is at, or the whole series, of which five
 /// steps at most stand for all.

@@ -98,7 +98,8 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
       least_pager_bytes_,
       backend_->bytes(options.size,
                       {.threads = options.threads, .waiting_splats = FrameBudget::kMinWaitingSplats}) +
-          LayerDrawer::bytes(options) + exchange_bytes + aside_bytes_,
+          LayerDrawer::bytes(options) + exchange_bytes + aside_bytes_ +
+          (options.light && options.light->hasShadows() ? ShadowGrid::kBytes : 0),
       options.output_bytes,
       planner_.mostSplats(),
       options.size,

@@ -1,5 +1,8 @@
 #include "render/frame/frame_plan.h"
 
+#include <tbb/info.h>
+#include <tbb/task_arena.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -13,6 +16,7 @@
 #include "render/ranks/picture_shares.h"
 #include "render/sweep/hidden_bricks.h"
 #include "stream/base/error.h"
+#include "stream/base/threads.h"
 #include "stream/cache/manifest.h"
 
 namespace curvisplat {
@@ -109,7 +113,7 @@ void FramePlanner::stepChanged() {
   colour_classes_ = colourClassesFor(cache_, coloured_by_);
   change_ = ClassificationChange(table_);
   if (colour_classes_) colour_change_.emplace(*colour_classes_);
-  forgetMergings();
+  forgetFunctions();
   subtrees_ = subtreesOf(cache_, variable_);
   if (coloured_by_) colour_subtrees_ = subtreesOf(cache_, coloured_by_->variable);
 }
@@ -120,12 +124,14 @@ void FramePlanner::setTransferFunction(const TransferFunction& transfer_function
   change_ = ClassificationChange(table_);
   if (!coloured_by_) colours_ = ColourTable(transfer_function);
   scalar_range_ = transfer_function.range();
-  forgetMergings();
+  forgetFunctions();
 }
 
-void FramePlanner::forgetMergings() {
+/// What was made of the functions that the pictures had.
+void FramePlanner::forgetFunctions() {
   const MutexLock lock(mutex_);
   mergings_ = LayerMergings();
+  shadows_ = {};
 }
 
 ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
@@ -144,6 +150,23 @@ std::shared_ptr<const GradientOpacity> FramePlanner::gradientOf(const FrameOptio
   return std::make_shared<const GradientOpacity>(options.gradient_opacity, *gradients_.percentiles);
 }
 
+std::shared_ptr<const ShadowGrid> FramePlanner::shadowsOf(const ProjectionSettings& settings,
+                                                          const FrameOptions& options) const {
+  if (!options.light || !options.light->hasShadows()) return nullptr;
+  std::vector<double> key = ShadowGrid::keyOf(settings);
+  for (const OpacityPoint& point : options.gradient_opacity)
+    for (const double of : {point.x, point.opacity, point.midpoint, point.sharpness}) key.push_back(of);
+  const MutexLock lock(mutex_);
+  if (!shadows_.grid || shadows_.key != key) {
+    tbb::task_arena arena(
+        std::min(static_cast<int>(threadsOrCores(options.threads)), tbb::info::default_concurrency()));
+    std::shared_ptr<const ShadowGrid> grid;
+    arena.execute([&] { grid = std::make_shared<const ShadowGrid>(cache_, variable_, table_, settings); });
+    shadows_ = {std::move(key), std::move(grid)};
+  }
+  return shadows_.grid;
+}
+
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
   ProjectionSettings settings{screenView(camera, options, size),
@@ -151,6 +174,7 @@ ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOp
                               clipPlanesOf(options.clip_planes, options.clip_box), options.light};
   settings.borders = borderStyleOf(cache_.manifest());
   settings.gradient = gradientOf(options);
+  settings.shadows = shadowsOf(settings, options);
   const double diagonal = glm::length(options.scale * (cache_.manifest().upper - cache_.manifest().lower));
   const double range = std::abs(scalar_range_.second - scalar_range_.first);
   if (diagonal > 0 && range > 0) settings.light_g0 = range / diagonal;

@@ -1,6 +1,6 @@
 // The stage "plan" of a frame: which parts of which bricks the view needs, the order in which they are
 // swept, and how their splats are projected. It reads the octree only, and no bricks but those that
-// gradients are measured in, once.
+// gradients are measured in and shadows are made from, once.
 //
 // The cut is chosen by the error that bricks have on the screen, weighted by what the transfer function
 // shows of it (errorWeight()). The same cache, view and options give the same plan. Any number of threads
@@ -23,6 +23,7 @@
 #include "render/project/depth_sort.h"
 #include "render/project/gradient_opacity.h"
 #include "render/project/projection.h"
+#include "render/project/shadow_grid.h"
 #include "render/project/tile_set.h"
 #include "render/ranks/splat_exchange.h"
 #include "render/sweep/sweep_buffer.h"
@@ -120,8 +121,10 @@ class FramePlanner {
   std::function<double(uint32_t)> errorWeightIn(const ProjectionSettings& settings, const CutView& view,
                                                 double lod_pixels) const;
   void planIsosurfaces(const FrameOptions& options, const CutOptions& limits, FramePlan& plan) const;
-  void forgetMergings();
+  void forgetFunctions();
   std::shared_ptr<const GradientOpacity> gradientOf(const FrameOptions& options) const;
+  std::shared_ptr<const ShadowGrid> shadowsOf(const ProjectionSettings& settings,
+                                              const FrameOptions& options) const;
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
   CutView cutViewOf(const ProjectionSettings& settings) const;
   Cut chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
@@ -152,6 +155,11 @@ class FramePlanner {
   mutable Mutex mutex_;
   mutable Gradients gradients_ GUARDED_BY(mutex_);
   mutable LayerMergings mergings_ GUARDED_BY(mutex_);
+  struct Shadows {
+    std::vector<double> key;
+    std::shared_ptr<const ShadowGrid> grid;
+  };
+  mutable Shadows shadows_ GUARDED_BY(mutex_);
 };
 
 /// The least weight, for this error allowed on the screen. The detail of bricks that count least is at most

@@ -117,7 +117,8 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
                        depth_origin,
                        opacities ? &*opacities : nullptr,
                        of_opacity,
-                       isosurfaces ? &*isosurfaces : nullptr};
+                       isosurfaces ? &*isosurfaces : nullptr,
+                       plan.settings.shadows.get()};
   std::shared_ptr<const PixelLayers> layers;
   arenaOf(options).execute([&] {
     SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);

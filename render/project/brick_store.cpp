@@ -80,7 +80,7 @@ BrickPieces BrickPieces::of(const GeometryArrays<const float>& geometry,
 }
 
 bool BrickStore::canDraw(const ProjectionSettings& settings) {
-  return !settings.layers && !settings.gradient;
+  return !settings.layers && !settings.gradient && !settings.shadows;
 }
 
 bool BrickStore::canDraw(const Brick& brick, const glm::dvec3& cell_min, const ProjectionSettings& settings) {

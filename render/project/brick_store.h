@@ -82,8 +82,8 @@ class BrickStore {
   /// range for it all the same, the brick is not stored, which has() tells; the next makeRoom() empties the store.
   virtual void put(uint32_t brick, const GeometryArrays<const float>& geometry,
                    const VariableArrays<const float>& values, const BrickPieces& pieces) = 0;
-  /// Whether pictures with these settings can be drawn from a store. Those with layers or gradient opacity
-  /// cannot.
+  /// Whether pictures with these settings can be drawn from a store. Those with layers, gradient opacity
+  /// or shadows cannot.
   static bool canDraw(const ProjectionSettings& settings);
   /// Whether the brick can be drawn from a store in such a picture: neither clip planes nor perspective may
   /// cut its splats. Positions of its splats are relative to `cell_min`.

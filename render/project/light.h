@@ -24,6 +24,12 @@ namespace curvisplat {
 struct Light {
   float ambient = 0.3f, diffuse = 0.7f, specular = 0.25f;  // each 0 to 1; ambient + diffuse at most 1
   std::optional<glm::dvec3> towards;  // towards the light, a direction; nullopt: towards the viewer
+  // How dark it is where no light arrives, each 0 to 1 (shadow_grid.h). A light at the viewer has no shadows.
+  float shadow = 0, ambient_occlusion = 0;
+
+  /// The direction towards a light that casts shadows where none is given.
+  static constexpr glm::dvec3 kShadowsFrom{1, -1, 2};
+  bool hasShadows() const { return (shadow > 0 && towards) || ambient_occlusion > 0; }
 };
 
 /// The factor of a splat's colour, and the amount of white to add; each 0 to 1.

@@ -391,6 +391,7 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   const BrickArrays brick{geometry, values.scalar, values.colours ? &*values.colours : nullptr};
   SlopeRules rules{{}, settings.gradient.get(), glm::vec3(1.0 / settings.view.scale)};
   if (settings.light) rules.light.emplace(*settings.light, settings.light_g0, settings.view, cell_min);
+  if (settings.light && settings.shadows) rules.shadows = settings.shadows->local(cell_min);
   SplatChooser chooser(settings.view, largestReach(settings.view.low_pass_px2),
                        {settings.per_pixel, settings.lit()}, table, {splats_, depths_});
   const auto projectAll = [&](const auto& map) {

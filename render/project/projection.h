@@ -31,6 +31,7 @@
 namespace curvisplat {
 
 class GradientOpacity;
+class ShadowGrid;
 
 /// Counts of splats by what became of them; these counts explain an empty picture.
 struct ProjectionCounts {
@@ -54,6 +55,7 @@ struct ProjectionSettings {
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
   const PixelLayers* layers = nullptr;   // surfaces and slices in the picture, which splats are cut at
   std::shared_ptr<const GradientOpacity> gradient = nullptr;  // factor of extinctions; null: 1
+  std::shared_ptr<const ShadowGrid> shadows = nullptr;        // factor of what `light` gives; null: 1
 
   /// Whether splats have light: painters must know.
   bool lit() const { return light.has_value(); }

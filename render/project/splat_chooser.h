@@ -29,6 +29,7 @@
 #include "render/project/plane_cuts.h"
 #include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
+#include "render/project/shadow_grid.h"
 #include "render/project/splat_pieces.h"
 
 namespace curvisplat {
@@ -44,6 +45,7 @@ struct SlopeRules {
   std::optional<LocalLight> light;
   const GradientOpacity* gradient;  // null: 1
   glm::vec3 per_scale;
+  std::optional<LocalShadows> shadows = std::nullopt;  // of `light`
 
   BySlope of(const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
              size_t i) const {
@@ -53,6 +55,11 @@ struct SlopeRules {
     const Slope slope = slopeOf(variable, i);
     if (gradient) by_slope.opacity = gradient->of(glm::length(gradientOf(shape, slope, per_scale)));
     if (light) by_slope.lit = light->of(geometry.x[i], geometry.y[i], geometry.z[i], shape, slope);
+    if (shadows) {
+      const float arriving = shadows->at(geometry.x[i], geometry.y[i], geometry.z[i]);
+      by_slope.lit.diffuse *= arriving;
+      by_slope.lit.specular *= arriving;
+    }
     return by_slope;
   }
 };

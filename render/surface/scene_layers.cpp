@@ -329,6 +329,24 @@ class PixelSlices {
   const SceneLook& look_;
 };
 
+/// Appends layers of the pixel, in the shadows of the volume.
+void appendShadowed(std::span<const PixelLayer> layers, const SceneLook& look, const ScreenView& view,
+                    const glm::dvec2& pixel, std::vector<PixelLayer>& out) {
+  const size_t before = out.size();
+  out.insert(out.end(), layers.begin(), layers.end());
+  if (!look.shadows) return;
+  const bool perspective = view.projection == Projection::kPerspective;
+  const glm::dvec2 across = (pixel - 0.5 * glm::dvec2(view.size.width, view.size.height)) / view.focal_px;
+  const glm::dvec3 beside = across.x * view.right + across.y * view.down;
+  for (size_t n = before; n < out.size(); ++n) {
+    const double depth = double{out[n].depth} + look.depth_origin;
+    const glm::dvec3 from_eye =
+        perspective ? depth * glm::normalize(beside + view.forward) : beside + depth * view.forward;
+    const float arriving = look.shadows->at((view.eye + from_eye) / view.scale);
+    out[n].colour = glm::vec4(arriving * glm::vec3(out[n].colour), out[n].colour.w);
+  }
+}
+
 }  // namespace
 
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
@@ -377,11 +395,10 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
       for (int x = tile.x0(); x <= tile.x1(); ++x) {
         const size_t before = out.layers.size();
         const auto of_samples = sampled.at(static_cast<size_t>(x - tile.x0()));
-        out.layers.insert(out.layers.end(), of_samples.begin(), of_samples.end());
+        appendShadowed(of_samples, look, view, {x + 0.5, y + 0.5}, out.layers);
         pixel_slices.append(x, y, out.layers);
         if (look.isosurfaces) {
-          const auto crossings = look.isosurfaces->at(x, y);
-          out.layers.insert(out.layers.end(), crossings.begin(), crossings.end());
+          appendShadowed(look.isosurfaces->at(x, y), look, view, {x + 0.5, y + 0.5}, out.layers);
         }
         out.endPixel(before);
       }

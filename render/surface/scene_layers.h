@@ -13,6 +13,7 @@
 #include "render/project/light.h"
 #include "render/project/pixel_layers.h"
 #include "render/project/screen_view.h"
+#include "render/project/shadow_grid.h"
 #include "render/surface/iso_layers.h"
 #include "render/surface/scene_triangles.h"
 #include "render/surface/slice_sampler.h"
@@ -30,6 +31,7 @@ struct SceneLook {
   const ColourTable* opacities = nullptr;
   std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
   const IsoLayers* isosurfaces = nullptr;
+  const ShadowGrid* shadows = nullptr;  // of the volume, on surfaces and isosurfaces
 };
 
 /// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread

@@ -81,10 +81,11 @@ class Pictures(PythonTest):
             self.expect_same(
                 cache.render(name, size=size, range="1%,99%", opacity=[(0, 0), (0.5, 0.8), (1, 0.1)],
                              opacity_unit=0.25, position=(20, -9, 8), focal_point=(4, 0, 2), view_angle=35,
-                             background="black", lod_pixels=2, shade=True, light_direction=(1, 0, 1)),
+                             background="black", lod_pixels=2, shade=True, light_direction=(1, 0, 1), shadow=0.5,
+                             ambient_occlusion=0.25),
                 "--scalar", name, "--range", "1%,99%", "--opacity", "0:0,0.5:0.8,1:0.1", "--opacity-unit", 0.25,
                 "--position", "20,-9,8", "--focal-point", "4,0,2", "--view-angle", 35, "--background", "black",
-                "--lod-pixels", 2, "--shade", "--light-direction", "1,0,1")
+                "--lod-pixels", 2, "--shade", "--light-direction", "1,0,1", "--shadow", 0.5, "--ambient-occlusion", 0.25)
             self.expect_same(cache.render(size=size, azimuth=30, elevation=-10.5, roll=5, zoom=1.5, gradient_opacity=[(0, 0), (0.5, 1)]),
                              "--azimuth", 30, "--elevation=-10.5", "--roll", 5, "--zoom", 1.5, "--gradient-opacity", "0:0,0.5:1")
             lines = self.folder / "lines.csv"

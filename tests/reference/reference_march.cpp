@@ -75,6 +75,7 @@ class Marcher {
       : field_(field),
         probe_(field.probe()),
         gradient_probe_(around.light || around.gradient_opacity ? field.probe() : nullptr),
+        shadow_probe_(around.light ? field.probe() : nullptr),
         function_(function),
         ray_(ray),
         steps_(steps),
@@ -193,7 +194,7 @@ class Marcher {
     if (found.optical.extinction > 0) {
       glm::dvec3& colour = found.optical.colour;
       if (colour_at_) colour = (*colour_at_)(at);
-      if (light_) colour = lit(colour, gradient(at, *scalar));
+      if (light_) colour = arrivingAt(at) * lit(colour, gradient(at, *scalar));
     }
     if (first_) held_ = found;
     return found;
@@ -225,6 +226,39 @@ class Marcher {
     const double shine = std::abs(glm::dot(n, glm::normalize(towards + viewer)));
     return (1 - strength + strength * (light_->ambient + light_->diffuse * facing)) * colour +
            glm::dvec3(strength * light_->specular * std::pow(shine, 32));
+  }
+
+  /// The share of the light that the volume lets through to a point.
+  double arrivingAt(const glm::dvec3& at) {
+    double arriving = 1;
+    if (light_->ambient_occlusion > 0) {
+      double sum = 0;
+      for (int n = 0; n < 27; ++n) {
+        const glm::dvec3 way(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        const double squared = glm::dot(way, way);  // 1: a face of a cube; 3: a corner
+        if (squared == 1 || squared == 3) sum += transmittance(at, way, light_->occlusion_reach);
+      }
+      arriving *= 1 - light_->ambient_occlusion * (1 - sum / 14);
+    }
+    if (light_->shadow > 0)
+      arriving *= 1 - light_->shadow *
+                          (1 - transmittance(at, *light_->towards, std::numeric_limits<double>::infinity()));
+    return arriving;
+  }
+
+  double transmittance(const glm::dvec3& at, const glm::dvec3& towards, double reach) {
+    const auto [lower, upper] = field_.bounds();
+    const Ray ray{at, glm::normalize(towards)};
+    const auto part = partInBox(ray, lower, upper);
+    const double length = std::min(reach, part ? part->second : 0.0);
+    const int steps = static_cast<int>(std::ceil(length / light_->shadow_step));
+    double depth = 0;
+    for (int n = 0; n < steps; ++n) {
+      const glm::dvec3 place = ray.at((n + 0.5) / steps * length);
+      const std::optional<double> scalar = shadow_probe_->at(place);
+      if (scalar) depth += function_(*scalar).extinction * length / steps;
+    }
+    return std::exp(-depth);
   }
 
   // The place where the field ends between a point inside and one outside, to the last bits.
@@ -271,7 +305,7 @@ class Marcher {
   }
 
   const ReferenceField& field_;
-  std::unique_ptr<FieldProbe> probe_, gradient_probe_;  // which remember where they were asked
+  std::unique_ptr<FieldProbe> probe_, gradient_probe_, shadow_probe_;  // which remember where they were asked
   const OpticalFunction& function_;
   Ray ray_;
   const MarchSteps& steps_;

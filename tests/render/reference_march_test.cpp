@@ -88,6 +88,40 @@ TEST(ReferenceMarch, MatchesAHomogeneousBoxInPerspective) {
     }
 }
 
+TEST(ReferenceMarch, CastsTheShadowsOfAHomogeneousBox) {
+  const Box box;
+  const SceneField field(box);
+  const Camera camera = alongX(Projection::kOrthographic);
+  ReferenceLight light{1, 0, 0};  // colours are those of the function, but for shadows
+  const auto redAt = [&](int x, int y) {
+    const ReferenceImage image =
+        referenceMarch(field, homogeneous, camera, {20, 20}, MarchSteps{0.02}, {&light});
+    return image.at(x, y).colour.r - image.at(x, y).transmittance;
+  };
+  const double passed = std::exp(-1.5 * 2), opaque = 1 - passed;
+  // From the top the distance is the same all along the ray; pixels are 0.1 high, the box's top is at 5.
+  light.towards = glm::dvec3(0, 0, 3);
+  light.shadow = 0.5;
+  EXPECT_NEAR(redAt(10, 8), 0.25 * opaque * (0.5 + 0.5 * std::exp(-1.5 * 0.35)), 1e-4);
+  // From the viewer's side light passes what the viewer sees through.
+  light.towards = glm::dvec3(-1, 0, 0);
+  EXPECT_NEAR(redAt(10, 10), 0.25 * (0.5 * opaque + 0.25 * (1 - passed * passed)), 1e-4);
+  // Nothing is nearer to the middle of the box than 0.45 but its faces at both ends.
+  light.shadow = 0;
+  light.ambient_occlusion = 1;
+  light.occlusion_reach = 0.2;
+  double expected = 0;
+  constexpr int kParts = 4000;
+  for (int n = 0; n < kParts; ++n) {
+    const double x = (n + 0.5) / kParts * 2, r = 0.2, slanted = std::sqrt(3.0);
+    const auto through = [](double length) { return std::exp(-1.5 * length); };
+    const double along = through(std::min(r, x)) + through(std::min(r, 2 - x));
+    const double corners = 4 * (through(std::min(r, slanted * x)) + through(std::min(r, slanted * (2 - x))));
+    expected += 0.25 * 1.5 * std::exp(-1.5 * x) * (4 * through(r) + along + corners) / 14 * 2 / kParts;
+  }
+  EXPECT_NEAR(redAt(10, 10), expected, 2e-4);
+}
+
 TEST(ReferenceMarch, HasTheImageTheRightWayUp) {
   Camera camera = alongX(Projection::kOrthographic);
   camera.focal_point += glm::dvec3(0, 0.5, 0.5);  // the box moves to the lower right: -y is on the right

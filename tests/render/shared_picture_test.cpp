@@ -174,6 +174,8 @@ TEST_F(SharedPicture, HasTheBitsWhereRanksDrawRegions) {
 TEST_F(SharedPicture, HasTheBitsWithLightCutsSurfacesAndSlices) {
   FrameOptions with = options();
   with.light = Light{};
+  with.light->towards = Light::kShadowsFrom;
+  with.light->shadow = with.light->ambient_occlusion = 0.5f;
   const Manifest& manifest = scene_->manifest();
   const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
   with.clip_planes = {{middle, {0, 1, 0.3}}};

@@ -153,6 +153,9 @@ def editing(tab):
     for name in ("scalar_bar", "axes", "axes_grid", "outline", "dark", "lit"):
         changes(tab, lambda name=name: tab.click(f"#{name}"), name)
     shot(tab, "dark_and_lit")
+    for name in ("shadow", "ambient_occlusion"):
+        changes(tab, lambda name=name: set_value(tab, f"#{name}", "0.8"), name)
+        set_value(tab, f"#{name}", "0")
     tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     changes(tab, lambda: (set_value(tab, "#clip", "on"), set_value(tab, "#clip-x-upper", "0.6")), "the clip box", "clipped")
     set_value(tab, "#clip", "off")

@@ -40,6 +40,8 @@ ViewState changedState() {
   state.slice_opacity = {0.5, true};
   state.volume = false;
   state.lit = true;
+  state.shadow = 0.5;
+  state.ambient_occlusion = 0.25;
   state.gradient_opacity = {{0, 0.25}, {0.5, 1}, {1, 0}};
   state.dark = true;
   state.annotations.axes = false;
@@ -68,7 +70,7 @@ TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
        {"clip_planes", "surfaces", "faces", "faces_by", "isovalues", "isosurfaces", "iso_opacity",
         "isosurfaces_by_function", "slices", "slice_opacity", "slices_by_function", "volume"})
     json.erase(field);
-  json.erase("lit");
+  for (const char* field : {"lit", "shadow", "ambient_occlusion"}) json.erase(field);
   json.erase("gradient_opacity");
   const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
   EXPECT_TRUE(state.clip_planes.empty());
@@ -79,6 +81,7 @@ TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   EXPECT_TRUE(state.slices.empty());
   EXPECT_TRUE(state.volume);
   EXPECT_FALSE(state.lit);
+  EXPECT_EQ(state.shadow + state.ambient_occlusion, 0);
   EXPECT_TRUE(state.gradient_opacity.empty());
 }
 
@@ -104,6 +107,7 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/camera/parallel_scale", -1, "camera.parallel_scale");
   expectError("/camera", nullptr, "camera");
   expectError("/gradient_opacity", "0.5", "gradient_opacity");
+  expectError("/shadow", 2, "shadow");
   expectError("/scale", nlohmann::json::array({1, 1, 0}), "scale");
   expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
   expectError("/clip_planes", 3, "clip_planes");
@@ -268,6 +272,8 @@ TEST(RenderCommand, HasEveryOption) {
   state.slice_opacity = {0.5, true};
   state.volume = false;
   state.lit = true;
+  state.shadow = 0.5;
+  state.ambient_occlusion = 0.25;
   state.dark = false;
   state.gradient_opacity = {{0, 0.25}, {0.5, 1}, {1, 0}};
   state.annotations = {.scalar_bar = true, .outline = true};
@@ -283,7 +289,7 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--clip-box 0,1,-0.5,1,0.25,1",
                                                   "--clip-plane 0,0.5,0,1,0,-2",
                                                   "--clip-plane 0.25,0,0,0,1,0",
-                                                  "--shade",
+                                                  "--shade --shadow 0.5 --ambient-occlusion 0.25",
                                                   "--gradient-opacity 0:0.25,0.5:1,1:0",
                                                   "--background white",
                                                   "--classify flat",

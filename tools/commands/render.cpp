@@ -312,8 +312,21 @@ void addRender(CLI::App& app) {
                    "implies --shade")
       ->group(what);
   command
-      ->add_option("--light-direction", arguments->frame.light_direction,
-                   "Direction x,y,z towards the light, after --scale (default: the viewer); implies --shade")
+      ->add_option(
+          "--light-direction", arguments->frame.light_direction,
+          "Direction x,y,z towards the light, after --scale (default: the viewer; with --shadow 1,-1,2); "
+          "implies --shade")
+      ->group(what);
+  command
+      ->add_option(
+          "--shadow", arguments->frame.shadow,
+          "How dark the shadow of the volume is, from 0 (none, the default) to 1 (black where no light "
+          "arrives); implies --shade")
+      ->group(what);
+  command
+      ->add_option(
+          "--ambient-occlusion", arguments->frame.ambient_occlusion,
+          "How dark places are that the volume surrounds, from 0 (none, the default) to 1; implies --shade")
       ->group(what);
   command
       ->add_option(

@@ -150,6 +150,8 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   if (const auto& light = options.light) {
     json["light"] = {{"ambient", light->ambient}, {"diffuse", light->diffuse}, {"specular", light->specular}};
     json["light"]["direction"] = light->towards ? toJson(*light->towards) : Json();
+    json["light"]["shadow"] = light->shadow;
+    json["light"]["ambient_occlusion"] = light->ambient_occlusion;
   }
   const glm::vec4& background = options.background;
   json["background"] = {background.r, background.g, background.b, background.a};

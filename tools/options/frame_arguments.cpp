@@ -45,9 +45,21 @@ std::vector<ClipPlane> parseClipPlanes(const std::vector<std::string>& texts) {
   return planes;
 }
 
+float parseDarkness(const char* option, const std::optional<std::string>& text) {
+  const double darkness = text ? parseNumber(option, *text) : 0;
+  if (!(darkness >= 0 && darkness <= 1))
+    throw UsageError("{} {}: expected a number from 0 (none) to 1", option, *text);
+  return static_cast<float>(darkness);
+}
+
 std::optional<Light> parseLight(const FrameArguments& arguments) {
-  if (!arguments.shade && !arguments.light && !arguments.light_direction) return std::nullopt;
   Light light;
+  light.shadow = parseDarkness("--shadow", arguments.shadow);
+  light.ambient_occlusion = parseDarkness("--ambient-occlusion", arguments.ambient_occlusion);
+  if (!arguments.shade && !arguments.light && !arguments.light_direction && light.shadow == 0 &&
+      light.ambient_occlusion == 0)
+    return std::nullopt;
+  if (light.shadow > 0) light.towards = Light::kShadowsFrom;
   if (arguments.light) {
     const auto n = parseNumbers("--light", *arguments.light, "ambient,diffuse,specular");
     for (const double strength : n)

@@ -23,7 +23,7 @@ struct FrameArguments {
   std::optional<std::string> clip_box, max_splats;
   std::vector<std::string> clip_planes;
   bool shade = false;
-  std::optional<std::string> light, light_direction, gradient_opacity;
+  std::optional<std::string> light, light_direction, shadow, ambient_occlusion, gradient_opacity;
   unsigned threads = 0;
   bool keep_going = false;
 };

@@ -242,6 +242,19 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
   ImGui::SameLine(column);
   actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
   nameWidget("axes grid");
+  if (!state.lit) return;
+  const auto darkness = [&](const char* name, const char* id, double& value, const char* help) {
+    auto shown = static_cast<float>(value);
+    label(name);
+    if (ImGui::SliderFloat(id, &shown, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+      value = static_cast<double>(shown);
+      actions.changed = true;
+    }
+    nameWidget(name);
+    hint(help);
+  };
+  darkness("shadow", "##shadow", state.shadow, "of the volume, in a light from x, -y and above; 0: none");
+  darkness("occlusion", "##occlusion", state.ambient_occlusion, "darkens what the volume surrounds; 0: none");
 }
 
 }  // namespace

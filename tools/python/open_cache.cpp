@@ -67,6 +67,8 @@ FrameArguments frameArguments(const Options& frame, const py::dict& others) {
   arguments.shade = of<bool>(others, "shade");
   arguments.light = given(frame, "light");
   arguments.light_direction = given(frame, "light_direction");
+  arguments.shadow = given(frame, "shadow");
+  arguments.ambient_occlusion = given(frame, "ambient_occlusion");
   arguments.gradient_opacity = given(frame, "gradient_opacity");
   arguments.threads = of<unsigned>(others, "threads");
   arguments.keep_going = of<bool>(others, "keep_going");

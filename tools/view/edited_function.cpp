@@ -7,10 +7,10 @@
 #include <optional>
 #include <utility>
 
-#include "render/automatic/coarse_samples.h"
 #include "render/colour/control_points.h"
 #include "render/colour/function_parts.h"
 #include "stream/base/error.h"
+#include "stream/cache/coarse_level.h"
 #include "stream/cache/value_histogram.h"
 
 namespace curvisplat {

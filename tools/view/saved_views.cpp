@@ -305,6 +305,9 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   }
   for (const ClipPlane& plane : visiblePlanes(state.clip_planes)) words.add("--clip-plane", text(plane));
   if (state.lit) words.add("--shade");
+  if (state.lit && state.shadow > 0) words.add("--shadow", number(state.shadow));
+  if (state.lit && state.ambient_occlusion > 0)
+    words.add("--ambient-occlusion", number(state.ambient_occlusion));
   if (!state.gradient_opacity.empty()) words.add("--gradient-opacity", textOf(state.gradient_opacity));
   addSurfaces(state, words);
   if (!state.dark) words.add("--background", "white");

@@ -334,7 +334,12 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.scale = scale;
   options.clip_box = clip_box;
   options.clip_planes = visiblePlanes(clip_planes);
-  if (lit) options.light = Light{};
+  if (lit) {
+    Light& light = options.light.emplace();
+    light.shadow = static_cast<float>(shadow);
+    light.ambient_occlusion = static_cast<float>(ambient_occlusion);
+    if (shadow > 0) light.towards = Light::kShadowsFrom;
+  }
   options.gradient_opacity = gradient_opacity;
   if (hasSheets()) {
     auto scene = std::make_shared<SurfaceScene>();
@@ -431,6 +436,8 @@ std::string toJson(const ViewState& state) {
   json["clip_planes"] = jsonOf(state.clip_planes);
   putSurfaces(json, state);
   json["lit"] = state.lit;
+  json["shadow"] = state.shadow;
+  json["ambient_occlusion"] = state.ambient_occlusion;
   json["gradient_opacity"] = textOf(state.gradient_opacity);
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
@@ -467,6 +474,9 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   if (const auto box = fields.find("clip_box")) state.clip_box = boxFrom(*box);
   state.clip_planes = planesFrom(fields, "clip_planes", kMaxClipPlanes);
   if (const auto lit = fields.find("lit")) state.lit = lit->flag();
+  if (const auto shadow = fields.find("shadow")) state.shadow = shadow->number(0, 1);
+  if (const auto occlusion = fields.find("ambient_occlusion"))
+    state.ambient_occlusion = occlusion->number(0, 1);
   if (const auto gradient = fields.find("gradient_opacity"); gradient && !gradient->text().empty())
     state.gradient_opacity = opacitiesFrom(*gradient);
   state.dark = fields.at("dark").flag();

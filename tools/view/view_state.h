@@ -93,6 +93,7 @@ struct ViewState {
   SheetOpacity iso_opacity = {};
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
+  double shadow = 0, ambient_occlusion = 0;         // Light's, where lit
   std::vector<OpacityPoint> gradient_opacity = {};  // FrameOptions'
   bool dark = true;                                 // background
   Annotations annotations{.scalar_bar = true, .axes = true};

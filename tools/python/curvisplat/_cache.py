@@ -346,7 +346,7 @@ class Cache:
                slice_opacity: Union[float, str] = 1, isovalues: Sequence[float] = (),
                iso_opacity: Union[float, str, None] = None, iso_by: str = "",
                volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
-               light_direction: Optional[Vector] = None,
+               light_direction: Optional[Vector] = None, shadow: Optional[float] = None, ambient_occlusion: Optional[float] = None,
                gradient_opacity: Union[str, Sequence[Tuple[float, float]], None] = None, background: str = "dark", scalar_bar: bool = False,
                scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
                axes_titles: Optional[Sequence[str]] = None, outline: bool = False, title: Optional[str] = None,
@@ -401,8 +401,8 @@ class Cache:
 
         volume: False leaves the volume out. background: "dark" (#15171c), "white", another colour, or "transparent"; colours that are chosen suit it.
 
-        shade: light level surfaces from the viewer; light: (ambient, diffuse, specular), and light_direction turn it on,
-        too. gradient_opacity: points (share of the volume that is less steep 0..1, factor of the opacity 0..1).
+        shade: light level surfaces from the viewer; light: (ambient, diffuse, specular), light_direction, shadow and
+        ambient_occlusion (0..1: how dark it is where the volume keeps light out) turn it on, too. gradient_opacity: points (share of the volume that is less steep 0..1, factor of the opacity 0..1).
 
         scalar_bar, scalar_bar_titles, axes, axes_grid, axes_titles (of x, y and z) and outline are drawn into the
         picture, and title and label, texts with the fields {time}, {step}, {frame}, {scalar} and {units}. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
@@ -426,7 +426,7 @@ class Cache:
                         opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf), iso_by=iso_by or None)
         frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
                        scale=scale, memory=str(memory), card_memory=None if card_memory is None else str(card_memory),
-                       lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
+                       lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction, shadow=shadow, ambient_occlusion=ambient_occlusion,
                        gradient_opacity=None if gradient_opacity is None else _opacities(gradient_opacity),
                        max_splats=None if max_splats is None else str(max_splats),
                        channels=",".join(_arguments.several(channels)) or "none",

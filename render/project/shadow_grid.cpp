@@ -1,0 +1,272 @@
+#include "render/project/shadow_grid.h"
+
+#include <tbb/parallel_for.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <cmath>
+#include <span>
+
+#include "render/project/gradient_opacity.h"
+#include "render/project/projection.h"
+#include "stream/cache/coarse_level.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kLeastSplats = 100'000;  // of the level; eight times as many at most
+constexpr int kMostPoints = 6;              // of a splat, along an axis
+constexpr double kOcclusionReach = 0.125;   // diagonals of the data
+
+/// Lattice cells are cubes in stretched space, except in thin data.
+ShadowLattice latticeOver(const glm::dvec3& lower, const glm::dvec3& upper, const glm::dvec3& scale) {
+  const glm::dvec3 extent = upper - lower, stretched = scale * extent;
+  const double longest = std::max({stretched.x, stretched.y, stretched.z, 1e-300});
+  ShadowLattice lattice;
+  lattice.lower = lower;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double cells = std::ceil(stretched[axis] / longest * (ShadowGrid::kMaxNodes - 1));
+    const int nodes = std::clamp(static_cast<int>(cells) + 1, ShadowGrid::kMinNodes, ShadowGrid::kMaxNodes);
+    lattice.nodes[static_cast<size_t>(axis)] = nodes;
+    lattice.edge[axis] = std::max(extent[axis], 1e-6 * longest / scale[axis]) / (nodes - 1);
+  }
+  return lattice;
+}
+
+/// The optical depths of a volume of extinction on a lattice.
+class ExtinctionLattice {
+ public:
+  ExtinctionLattice(const ShadowLattice& lattice, const glm::dvec3& scale)
+      : lattice_(lattice), scale_(scale), extinctions_(lattice.size(), 0.0f) {}
+
+  /// Adds the splats of a level.
+  void add(const CacheReader& cache, size_t variable, const ClassificationTable& table,
+           const ProjectionSettings& settings);
+  /// Replaces the sums of extinction times volume by extinctions. Nodes on faces have less of the volume.
+  void divide();
+  /// [node] the optical depth from there in the direction `towards`, stretched, of length 1, as far as `reach`
+  /// or the box's end.
+  std::vector<float> depths(const glm::dvec3& towards, double reach) const;
+
+ private:
+  void addPoint(const glm::dvec3& data, double amount);
+
+  const ShadowLattice lattice_;
+  const glm::dvec3 scale_;
+  std::vector<float> extinctions_;
+};
+
+void ExtinctionLattice::addPoint(const glm::dvec3& data, double amount) {
+  std::array<int, 3> node{};
+  std::array<std::array<double, 2>, 3> weights{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<int>(axis);
+    const double last = lattice_.nodes[axis] - 1;
+    const double at = std::clamp((data[a] - lattice_.lower[a]) / lattice_.edge[a], 0.0, last);
+    node[axis] = static_cast<int>(std::min(std::floor(at), last - 1));
+    const double part = at - node[axis];
+    weights[axis] = {1 - part, part};
+  }
+  for (int n = 0; n < 8; ++n) {
+    const int i = n & 1, j = n >> 1 & 1, k = n >> 2;
+    const double weight = weights[0][static_cast<size_t>(i)] * weights[1][static_cast<size_t>(j)] *
+                          weights[2][static_cast<size_t>(k)];
+    extinctions_[lattice_.index(node[0] + i, node[1] + j, node[2] + k)] +=
+        static_cast<float>(amount * weight);
+  }
+}
+
+/// A splat's cell as points, close enough together for a lattice.
+struct CellPoints {
+  CellPoints(const Shape& s, const glm::dvec3& edge)
+      : columns{glm::dvec3(s.axis0, s.axis0 * s.shear10, s.axis0 * s.shear20),
+                glm::dvec3(0, s.axis1, s.axis1 * s.shear21), glm::dvec3(0, 0, s.axis2)} {
+    for (size_t c = 0; c < 3; ++c) {
+      const glm::dvec3 cells = glm::abs(columns[c] / edge);
+      const double most = std::max({cells.x, cells.y, cells.z});
+      along[c] = std::isfinite(most)
+                     ? std::clamp(static_cast<int>(std::ceil(std::min(most, 99.0))), 1, kMostPoints)
+                     : 1;
+    }
+  }
+  int count() const { return along[0] * along[1] * along[2]; }
+  /// Of [-1/2, 1/2] along each column.
+  glm::dvec3 placeOf(int n) const {
+    const auto part = [](int at, int of) { return (at + 0.5) / of - 0.5; };
+    return {part(n % along[0], along[0]), part(n / along[0] % along[1], along[1]),
+            part(n / along[0] / along[1], along[2])};
+  }
+  glm::dvec3 offsetOf(const glm::dvec3& place) const {
+    return place.x * columns[0] + place.y * columns[1] + place.z * columns[2];
+  }
+
+  std::array<glm::dvec3, 3> columns;
+  std::array<int, 3> along{};
+};
+
+void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const ClassificationTable& table,
+                            const ProjectionSettings& settings) {
+  const glm::vec3 per_scale(1.0 / scale_);
+  const auto is_clipped = [&](const glm::dvec3& at) {
+    return std::any_of(settings.clip_planes.begin(), settings.clip_planes.end(),
+                       [&](const ClipPlane& plane) { return glm::dot(plane.normal, at - plane.point) < 0; });
+  };
+  SplatGeometry geometry;
+  SplatVariable values;
+  for (const uint32_t brick : bricksAtALevel(cache, kLeastSplats)) {
+    const BrickVariable& bounds = cache.brickVariables(variable)[brick];
+    const float spread = bounds.largest_slope + 2 * bounds.largest_deviation;  // √3 deviations are looked up
+    if (table.fullyTransparent(bounds.min - spread, bounds.max + spread)) continue;
+    try {
+      cache.readGeometry(brick, geometry);
+      cache.readVariable(brick, variable, values);
+    } catch (const DamagedBrick&) {
+      continue;  // drawing it reports it
+    }
+    const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[brick].cell);
+    for (size_t i = 0; i < geometry.size(); ++i) {
+      const Shape shape{geometry.axis0[i],   geometry.axis1[i],   geometry.axis2[i],
+                        geometry.shear10[i], geometry.shear20[i], geometry.shear21[i]};
+      const Slope slope{values.slope0[i], values.slope1[i], values.slope2[i]};
+      const glm::dvec3 w(slope.w0, slope.w1, slope.w2);
+      const CellPoints points(shape, lattice_.edge);
+      double volume = double{geometry.weight[i]} / points.count();
+      if (settings.gradient)
+        volume *= double{settings.gradient->of(glm::length(gradientOf(shape, slope, per_scale)))};
+      if (!(volume > 0 && std::isfinite(volume))) continue;
+      const glm::dvec3 centre = corner + glm::dvec3(geometry.x[i], geometry.y[i], geometry.z[i]);
+      const glm::dvec3 within(w.x / points.along[0], w.y / points.along[1], w.z / points.along[2]);
+      const double half_width =
+          std::sqrt(3 * std::max(0.0, double{values.variance[i]}) + 0.25 * glm::dot(within, within));
+      for (int n = 0; n < points.count(); ++n) {
+        const glm::dvec3 place = points.placeOf(n), at = centre + points.offsetOf(place);
+        const double extinction = table.mean(double{values.mean[i]} + glm::dot(w, place), half_width).w;
+        if (extinction > 0 && !is_clipped(at)) addPoint(at, extinction * volume);
+      }
+    }
+  }
+}
+
+void ExtinctionLattice::divide() {
+  const auto& [columns, rows, layers] = lattice_.nodes;
+  const double volume = lattice_.edge.x * lattice_.edge.y * lattice_.edge.z;
+  const auto shareOf = [](int n, int nodes) { return n == 0 || n == nodes - 1 ? 0.5 : 1.0; };
+  for (int k = 0; k < layers; ++k)
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i)
+        extinctions_[lattice_.index(i, j, k)] /=
+            static_cast<float>(volume * shareOf(i, columns) * shareOf(j, rows) * shareOf(k, layers));
+}
+
+/// The trapezoidal rule from one layer of nodes to the next, across the axis along which the ray passes most
+/// of them: within a layer values are bilinear. What is left at the end counts as the last sample.
+std::vector<float> ExtinctionLattice::depths(const glm::dvec3& towards, double reach) const {
+  const glm::dvec3 passed = towards / (scale_ * lattice_.edge);  // cells, to a unit of length
+  const glm::dvec3 most = glm::abs(passed);
+  const int main = most.x >= most.y && most.x >= most.z ? 0 : most.y >= most.z ? 1 : 2;
+  const int u = (main + 1) % 3, v = (main + 2) % 3;
+  const auto main_axis = static_cast<size_t>(main), u_axis = static_cast<size_t>(u),
+             v_axis = static_cast<size_t>(v);
+  const double length = 1 / most[main];  // of a step
+  const glm::dvec3 step = passed * length;
+  const std::array<size_t, 3> strides{1, lattice_.index(0, 1, 0), lattice_.index(0, 0, 1)};
+  const size_t along_u = strides[u_axis], along_v = strides[v_axis];
+  const std::ptrdiff_t along = static_cast<std::ptrdiff_t>(strides[main_axis]) * (step[main] > 0 ? 1 : -1);
+
+  std::vector<float> out(lattice_.size());
+  const auto depthFrom = [&](const std::array<int, 3>& node) {
+    double steps = reach / length;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto a = static_cast<size_t>(axis);
+      if (step[axis] > 0) steps = std::min(steps, (lattice_.nodes[a] - 1 - node[a]) / step[axis]);
+      if (step[axis] < 0) steps = std::min(steps, node[a] / -step[axis]);
+    }
+    const auto whole = static_cast<int>(steps);
+    const double rest = steps - whole;
+    const float own = extinctions_[lattice_.index(node[0], node[1], node[2])];
+    double sum = double{own} * (whole > 0 ? 0.5 : rest);
+    const float* layer = extinctions_.data() + static_cast<std::ptrdiff_t>(node[main_axis]) *
+                                                   static_cast<std::ptrdiff_t>(strides[main_axis]);
+    for (int n = 1; n <= whole; ++n) {
+      layer += along;
+      const auto placeOn = [&](int axis, size_t a) {
+        const double last = lattice_.nodes[a] - 1;
+        const double at = std::clamp(node[a] + n * step[axis], 0.0, last);
+        const double first = std::min(static_cast<double>(static_cast<int>(at)), last - 1);
+        return std::pair(static_cast<size_t>(first), static_cast<float>(at - first));
+      };
+      const std::pair<size_t, float> on_u = placeOn(u, u_axis), on_v = placeOn(v, v_axis);
+      const float* const corner = layer + on_u.first * along_u + on_v.first * along_v;
+      const float here = corner[0] + on_u.second * (corner[along_u] - corner[0]);
+      const float* const next = corner + along_v;
+      const float there = next[0] + on_u.second * (next[along_u] - next[0]);
+      sum += double{here + on_v.second * (there - here)} * (n < whole ? 1 : 0.5 + rest);
+    }
+    return static_cast<float>(sum * length);
+  };
+  tbb::parallel_for(0, lattice_.nodes[2], [&](int k) {
+    for (int j = 0; j < lattice_.nodes[1]; ++j)
+      for (int i = 0; i < lattice_.nodes[0]; ++i) out[lattice_.index(i, j, k)] = depthFrom({i, j, k});
+  });
+  return out;
+}
+
+/// The directions of ambient light: towards the faces and the corners of a cube.
+std::vector<glm::dvec3> directionsAround() {
+  std::vector<glm::dvec3> directions;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double sign : {-1.0, 1.0}) {
+      glm::dvec3 direction(0.0);
+      direction[axis] = sign;
+      directions.push_back(direction);
+    }
+  for (int n = 0; n < 8; ++n)
+    directions.push_back(glm::normalize(glm::dvec3(n & 1 ? 1 : -1, n & 2 ? 1 : -1, n & 4 ? 1 : -1)));
+  return directions;
+}
+
+}  // namespace
+
+std::vector<double> ShadowGrid::keyOf(const ProjectionSettings& settings) {
+  const Light& light = *settings.light;
+  std::vector<double> key;
+  const auto add = [&key](const glm::dvec3& of) {
+    for (int axis = 0; axis < 3; ++axis) key.push_back(of[axis]);
+  };
+  add(light.towards.value_or(glm::dvec3(0.0)));
+  add({light.shadow, light.ambient_occlusion, 0});
+  add(settings.view.scale);
+  for (const ClipPlane& plane : settings.clip_planes) {
+    add(plane.point);
+    add(plane.normal);
+  }
+  return key;
+}
+
+ShadowGrid::ShadowGrid(const CacheReader& cache, size_t variable, const ClassificationTable& table,
+                       const ProjectionSettings& settings)
+    : lattice_(latticeOver(cache.manifest().lower, cache.manifest().upper, settings.view.scale)),
+      arriving_(lattice_.size(), 1.0f) {
+  const Light& light = *settings.light;
+  const glm::dvec3 stretched = settings.view.scale * (cache.manifest().upper - cache.manifest().lower);
+  ExtinctionLattice extinctions(lattice_, settings.view.scale);
+  extinctions.add(cache, variable, table, settings);
+  extinctions.divide();
+  if (light.ambient_occlusion > 0) {
+    const std::vector<glm::dvec3> directions = directionsAround();
+    const float share = light.ambient_occlusion / static_cast<float>(directions.size());
+    for (const glm::dvec3& direction : directions) {
+      const std::vector<float> depths =
+          extinctions.depths(direction, kOcclusionReach * glm::length(stretched));
+      for (size_t n = 0; n < depths.size(); ++n) arriving_[n] -= share * -std::expm1(-depths[n]);
+    }
+  }
+  if (light.shadow > 0 && light.towards) {
+    const std::vector<float> depths =
+        extinctions.depths(glm::normalize(*light.towards), glm::length(stretched));
+    for (size_t n = 0; n < depths.size(); ++n) arriving_[n] *= 1 - light.shadow * -std::expm1(-depths[n]);
+  }
+}
+
+}  // namespace curvisplat
