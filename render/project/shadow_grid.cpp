@@ -50,31 +50,49 @@ class ExtinctionLattice {
   std::vector<float> depths(const glm::dvec3& towards, double reach) const;
 
  private:
-  void addPoint(const glm::dvec3& data, double amount);
+  void addBox(const glm::dvec3& data, const glm::dvec3& half, double amount);
 
   const ShadowLattice lattice_;
   const glm::dvec3 scale_;
   std::vector<float> extinctions_;
 };
 
-void ExtinctionLattice::addPoint(const glm::dvec3& data, double amount) {
-  std::array<int, 3> node{};
-  std::array<std::array<double, 2>, 3> weights{};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<int>(axis);
-    const double last = lattice_.nodes[axis] - 1;
-    const double at = std::clamp((data[a] - lattice_.lower[a]) / lattice_.edge[a], 0.0, last);
-    node[axis] = static_cast<int>(std::min(std::floor(at), last - 1));
-    const double part = at - node[axis];
-    weights[axis] = {1 - part, part};
+/// The shares of a box along an axis that the nodes from `first` on get: each place's goes to the two nodes
+/// beside it, the nearer the more. So boxes that fill space give even shares, wherever nodes lie between them.
+struct AxisShares {
+  AxisShares(double at, double half, int nodes) {
+    const double last = nodes - 1, inside = std::clamp(at, 0.0, last);
+    const double low = std::max(inside - half, 0.0),
+                 high = std::max(std::min(inside + half, last), low + 1e-9);
+    first = std::min(static_cast<int>(low), nodes - 2);
+    for (int cell = 0; cell < kMost - 1 && first + cell < nodes - 1; ++cell) {
+      const double begin = std::max(low - first - cell, 0.0), end = std::min(high - first - cell, 1.0);
+      if (end <= begin) break;
+      const double share = (end - begin) / (high - low), middle = 0.5 * (begin + end);
+      of[static_cast<size_t>(cell)] += share * (1 - middle);
+      of[static_cast<size_t>(cell) + 1] = share * middle;
+      count = cell + 2;
+    }
   }
-  for (int n = 0; n < 8; ++n) {
-    const int i = n & 1, j = n >> 1 & 1, k = n >> 2;
-    const double weight = weights[0][static_cast<size_t>(i)] * weights[1][static_cast<size_t>(j)] *
-                          weights[2][static_cast<size_t>(k)];
-    extinctions_[lattice_.index(node[0] + i, node[1] + j, node[2] + k)] +=
-        static_cast<float>(amount * weight);
-  }
+
+  static constexpr int kMost = 4;
+  int first = 0, count = 0;
+  std::array<double, kMost> of{};
+};
+
+void ExtinctionLattice::addBox(const glm::dvec3& data, const glm::dvec3& half, double amount) {
+  const auto sharesOf = [&](int axis) {
+    const double edge = lattice_.edge[axis];
+    return AxisShares((data[axis] - lattice_.lower[axis]) / edge, std::min(half[axis] / edge, 1.0),
+                      lattice_.nodes[static_cast<size_t>(axis)]);
+  };
+  const AxisShares x = sharesOf(0), y = sharesOf(1), z = sharesOf(2);
+  for (int k = 0; k < z.count; ++k)
+    for (int j = 0; j < y.count; ++j) {
+      const double of_row = amount * z.of[static_cast<size_t>(k)] * y.of[static_cast<size_t>(j)];
+      float* const row = extinctions_.data() + lattice_.index(x.first, y.first + j, z.first + k);
+      for (int i = 0; i < x.count; ++i) row[i] += static_cast<float>(of_row * x.of[static_cast<size_t>(i)]);
+    }
 }
 
 /// A splat's cell as points, close enough together for a lattice.
@@ -96,6 +114,12 @@ struct CellPoints {
     const auto part = [](int at, int of) { return (at + 0.5) / of - 0.5; };
     return {part(n % along[0], along[0]), part(n / along[0] % along[1], along[1]),
             part(n / along[0] / along[1], along[2])};
+  }
+  /// Of the box around the part of the cell that a point stands for.
+  glm::dvec3 halfBox() const {
+    glm::dvec3 half(0.0);
+    for (size_t c = 0; c < 3; ++c) half += glm::abs(columns[c]) / (2.0 * along[c]);
+    return half;
   }
   glm::dvec3 offsetOf(const glm::dvec3& place) const {
     return place.x * columns[0] + place.y * columns[1] + place.z * columns[2];
@@ -139,10 +163,11 @@ void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const Cla
       const glm::dvec3 within(w.x / points.along[0], w.y / points.along[1], w.z / points.along[2]);
       const double half_width =
           std::sqrt(3 * std::max(0.0, double{values.variance[i]}) + 0.25 * glm::dot(within, within));
+      const glm::dvec3 half = points.halfBox();
       for (int n = 0; n < points.count(); ++n) {
         const glm::dvec3 place = points.placeOf(n), at = centre + points.offsetOf(place);
         const double extinction = table.mean(double{values.mean[i]} + glm::dot(w, place), half_width).w;
-        if (extinction > 0 && !is_clipped(at)) addPoint(at, extinction * volume);
+        if (extinction > 0 && !is_clipped(at)) addBox(at, half, extinction * volume);
       }
     }
   }

@@ -92,7 +92,9 @@ TEST(ReferenceMarch, CastsTheShadowsOfAHomogeneousBox) {
   const Box box;
   const SceneField field(box);
   const Camera camera = alongX(Projection::kOrthographic);
-  ReferenceLight light{1, 0, 0};  // colours are those of the function, but for shadows
+  ReferenceLight light;
+  light.ambient = 1;  // colours are those of the function, but for shadows
+  light.diffuse = light.specular = 0;
   const auto redAt = [&](int x, int y) {
     const ReferenceImage image =
         referenceMarch(field, homogeneous, camera, {20, 20}, MarchSteps{0.02}, {&light});
