@@ -153,7 +153,8 @@ std::shared_ptr<const GradientOpacity> FramePlanner::gradientOf(const FrameOptio
 std::shared_ptr<const ShadowGrid> FramePlanner::shadowsOf(const ProjectionSettings& settings,
                                                           const FrameOptions& options) const {
   if (!options.light || !options.light->hasShadows()) return nullptr;
-  std::vector<double> key = ShadowGrid::keyOf(settings);
+  const ShadowScene scene{*options.light, options.scale, settings.clip_planes, settings.gradient.get()};
+  std::vector<double> key = ShadowGrid::keyOf(scene);
   for (const OpacityPoint& point : options.gradient_opacity)
     for (const double of : {point.x, point.opacity, point.midpoint, point.sharpness}) key.push_back(of);
   const MutexLock lock(mutex_);
@@ -161,7 +162,7 @@ std::shared_ptr<const ShadowGrid> FramePlanner::shadowsOf(const ProjectionSettin
     tbb::task_arena arena(
         std::min(static_cast<int>(threadsOrCores(options.threads)), tbb::info::default_concurrency()));
     std::shared_ptr<const ShadowGrid> grid;
-    arena.execute([&] { grid = std::make_shared<const ShadowGrid>(cache_, variable_, table_, settings); });
+    arena.execute([&] { grid = std::make_shared<const ShadowGrid>(cache_, variable_, table_, scene); });
     shadows_ = {std::move(key), std::move(grid)};
   }
   return shadows_.grid;

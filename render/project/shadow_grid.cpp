@@ -9,15 +9,14 @@
 #include <span>
 
 #include "render/project/gradient_opacity.h"
-#include "render/project/projection.h"
 #include "stream/cache/coarse_level.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kLeastSplats = 100'000;  // of the level; eight times as many at most
-constexpr int kMostPoints = 6;              // of a splat, along an axis
-constexpr double kOcclusionReach = 0.125;   // diagonals of the data
+constexpr uint64_t kMinSplatsOfLevel = 100'000;  // of the level; eight times as many at most
+constexpr int kMaxPoints = 6;                    // of a splat, along an axis
+constexpr double kOcclusionReach = 0.125;        // diagonals of the data
 
 /// Lattice cells are cubes in stretched space, except in thin data.
 ShadowLattice latticeOver(const glm::dvec3& lower, const glm::dvec3& upper, const glm::dvec3& scale) {
@@ -42,7 +41,7 @@ class ExtinctionLattice {
 
   /// Adds the splats of a level.
   void add(const CacheReader& cache, size_t variable, const ClassificationTable& table,
-           const ProjectionSettings& settings);
+           const ShadowScene& scene);
   /// Replaces the sums of extinction times volume by extinctions. Nodes on faces have less of the volume.
   void divide();
   /// [node] the optical depth from there in the direction `towards`, stretched, of length 1, as far as `reach`
@@ -65,7 +64,7 @@ struct AxisShares {
     const double low = std::max(inside - half, 0.0),
                  high = std::max(std::min(inside + half, last), low + 1e-9);
     first = std::min(static_cast<int>(low), nodes - 2);
-    for (int cell = 0; cell < kMost - 1 && first + cell < nodes - 1; ++cell) {
+    for (int cell = 0; cell < kMaxShares - 1 && first + cell < nodes - 1; ++cell) {
       const double begin = std::max(low - first - cell, 0.0), end = std::min(high - first - cell, 1.0);
       if (end <= begin) break;
       const double share = (end - begin) / (high - low), middle = 0.5 * (begin + end);
@@ -75,9 +74,9 @@ struct AxisShares {
     }
   }
 
-  static constexpr int kMost = 4;
+  static constexpr int kMaxShares = 4;
   int first = 0, count = 0;
-  std::array<double, kMost> of{};
+  std::array<double, kMaxShares> of{};
 };
 
 void ExtinctionLattice::addBox(const glm::dvec3& data, const glm::dvec3& half, double amount) {
@@ -104,18 +103,18 @@ struct CellPoints {
       const glm::dvec3 cells = glm::abs(columns[c] / edge);
       const double most = std::max({cells.x, cells.y, cells.z});
       along[c] = std::isfinite(most)
-                     ? std::clamp(static_cast<int>(std::ceil(std::min(most, 99.0))), 1, kMostPoints)
+                     ? std::clamp(static_cast<int>(std::ceil(std::min(most, 99.0))), 1, kMaxPoints)
                      : 1;
     }
   }
   int count() const { return along[0] * along[1] * along[2]; }
-  /// Of [-1/2, 1/2] along each column.
+  /// The place of a point, in [-1/2, 1/2] along each column.
   glm::dvec3 placeOf(int n) const {
     const auto part = [](int at, int of) { return (at + 0.5) / of - 0.5; };
     return {part(n % along[0], along[0]), part(n / along[0] % along[1], along[1]),
             part(n / along[0] / along[1], along[2])};
   }
-  /// Of the box around the part of the cell that a point stands for.
+  /// Half of the box around the part of the cell that a point stands for.
   glm::dvec3 halfBox() const {
     glm::dvec3 half(0.0);
     for (size_t c = 0; c < 3; ++c) half += glm::abs(columns[c]) / (2.0 * along[c]);
@@ -130,15 +129,15 @@ struct CellPoints {
 };
 
 void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const ClassificationTable& table,
-                            const ProjectionSettings& settings) {
+                            const ShadowScene& scene) {
   const glm::vec3 per_scale(1.0 / scale_);
   const auto is_clipped = [&](const glm::dvec3& at) {
-    return std::any_of(settings.clip_planes.begin(), settings.clip_planes.end(),
+    return std::any_of(scene.clip_planes.begin(), scene.clip_planes.end(),
                        [&](const ClipPlane& plane) { return glm::dot(plane.normal, at - plane.point) < 0; });
   };
   SplatGeometry geometry;
   SplatVariable values;
-  for (const uint32_t brick : bricksAtALevel(cache, kLeastSplats)) {
+  for (const uint32_t brick : bricksAtALevel(cache, kMinSplatsOfLevel)) {
     const BrickVariable& bounds = cache.brickVariables(variable)[brick];
     const float spread = bounds.largest_slope + 2 * bounds.largest_deviation;  // √3 deviations are looked up
     if (table.fullyTransparent(bounds.min - spread, bounds.max + spread)) continue;
@@ -156,8 +155,8 @@ void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const Cla
       const glm::dvec3 w(slope.w0, slope.w1, slope.w2);
       const CellPoints points(shape, lattice_.edge);
       double volume = double{geometry.weight[i]} / points.count();
-      if (settings.gradient)
-        volume *= double{settings.gradient->of(glm::length(gradientOf(shape, slope, per_scale)))};
+      if (scene.gradient)
+        volume *= double{scene.gradient->of(glm::length(gradientOf(shape, slope, per_scale)))};
       if (!(volume > 0 && std::isfinite(volume))) continue;
       const glm::dvec3 centre = corner + glm::dvec3(geometry.x[i], geometry.y[i], geometry.z[i]);
       const glm::dvec3 within(w.x / points.along[0], w.y / points.along[1], w.z / points.along[2]);
@@ -253,16 +252,16 @@ std::vector<glm::dvec3> directionsAround() {
 
 }  // namespace
 
-std::vector<double> ShadowGrid::keyOf(const ProjectionSettings& settings) {
-  const Light& light = *settings.light;
+std::vector<double> ShadowGrid::keyOf(const ShadowScene& scene) {
+  const Light& light = scene.light;
   std::vector<double> key;
   const auto add = [&key](const glm::dvec3& of) {
     for (int axis = 0; axis < 3; ++axis) key.push_back(of[axis]);
   };
   add(light.towards.value_or(glm::dvec3(0.0)));
   add({light.shadow, light.ambient_occlusion, 0});
-  add(settings.view.scale);
-  for (const ClipPlane& plane : settings.clip_planes) {
+  add(scene.scale);
+  for (const ClipPlane& plane : scene.clip_planes) {
     add(plane.point);
     add(plane.normal);
   }
@@ -270,13 +269,13 @@ std::vector<double> ShadowGrid::keyOf(const ProjectionSettings& settings) {
 }
 
 ShadowGrid::ShadowGrid(const CacheReader& cache, size_t variable, const ClassificationTable& table,
-                       const ProjectionSettings& settings)
-    : lattice_(latticeOver(cache.manifest().lower, cache.manifest().upper, settings.view.scale)),
+                       const ShadowScene& scene)
+    : lattice_(latticeOver(cache.manifest().lower, cache.manifest().upper, scene.scale)),
       arriving_(lattice_.size(), 1.0f) {
-  const Light& light = *settings.light;
-  const glm::dvec3 stretched = settings.view.scale * (cache.manifest().upper - cache.manifest().lower);
-  ExtinctionLattice extinctions(lattice_, settings.view.scale);
-  extinctions.add(cache, variable, table, settings);
+  const Light& light = scene.light;
+  const glm::dvec3 stretched = scene.scale * (cache.manifest().upper - cache.manifest().lower);
+  ExtinctionLattice extinctions(lattice_, scene.scale);
+  extinctions.add(cache, variable, table, scene);
   extinctions.divide();
   if (light.ambient_occlusion > 0) {
     const std::vector<glm::dvec3> directions = directionsAround();

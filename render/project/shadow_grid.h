@@ -20,11 +20,20 @@
 
 #include "render/colour/classification.h"
 #include "render/project/light.h"
+#include "render/project/plane_cuts.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 
-struct ProjectionSettings;
+class GradientOpacity;
+
+/// The volume that casts shadows, and the light.
+struct ShadowScene {
+  Light light;
+  glm::dvec3 scale{1.0};
+  std::vector<ClipPlane> clip_planes;         // what is outside of them casts none
+  const GradientOpacity* gradient = nullptr;  // null: 1
+};
 
 /// A lattice of nodes over the data's box, those at its ends on the faces. The first axis runs fastest.
 struct ShadowLattice {
@@ -85,18 +94,18 @@ class LocalShadows {
 class ShadowGrid {
  public:
   static constexpr int kMaxNodes = 81, kMinNodes = 17;  // along an axis
-  /// What building one takes for a moment; it keeps a third of the lattices.
+  /// The memory in bytes of building a grid, which keeps a third of the lattices.
   static constexpr uint64_t kBytes = uint64_t{kMaxNodes} * kMaxNodes * kMaxNodes * 3 * sizeof(float) +
                                      uint64_t{kMaxBrickSplats} * 20 * sizeof(float);
 
-  /// What settings with shadows look at, by which a grid is known again: `light`, `view.scale`,
-  /// `clip_planes`. Their gradient and the table are the caller's to compare.
-  static std::vector<double> keyOf(const ProjectionSettings& settings);
+  /// A key by which a grid is known again: all of the scene but its gradient, which the caller compares, as
+  /// the table and the cache.
+  static std::vector<double> keyOf(const ShadowScene& scene);
 
-  /// `settings` have a light with shadows. Damaged bricks are left out; throws Error if the disk fails.
-  /// Parallel on the caller's TBB arena.
+  /// The scene's light has shadows. Damaged bricks are left out; throws Error if the disk fails. Parallel on
+  /// the caller's TBB arena.
   ShadowGrid(const CacheReader& cache, size_t variable, const ClassificationTable& table,
-             const ProjectionSettings& settings);
+             const ShadowScene& scene);
 
   LocalShadows local(const glm::dvec3& origin) const { return {lattice_, arriving_.data(), origin}; }
   float at(const glm::dvec3& data) const { return local(data).at(0, 0, 0); }

@@ -60,7 +60,12 @@ class Shadows : public testing::Test {
         ClassificationTable::of(KnownFunction::of("smooth").table, 0, 1));
   }
 
-  ShadowGrid gridOf(const ProjectionSettings& settings) const { return {*cache_, 0, *table_, settings}; }
+  ShadowGrid gridOf(const ProjectionSettings& settings) const {
+    return {*cache_,
+            0,
+            *table_,
+            {*settings.light, settings.view.scale, settings.clip_planes, settings.gradient.get()}};
+  }
 
   static Light lightFrom(const glm::dvec3& towards, float shadow, float ambient_occlusion = 0) {
     Light light;

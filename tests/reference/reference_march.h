@@ -65,7 +65,7 @@ struct ReferenceLight {
   double ambient = 0.3, diffuse = 0.7, specular = 0.25;
   double g0 = 1;                      // the scalar's unit per world unit
   std::optional<glm::dvec3> towards;  // the light; none: it is where the viewer is
-  // As render/project/shadow_grid.h has them, by marches from every point, in steps of at most `shadow_step`.
+  // The strengths of render/project/shadow_grid.h, by marches from every point in steps of at most `shadow_step`.
   double shadow = 0, ambient_occlusion = 0;
   double occlusion_reach = 0;  // world units
   double shadow_step = 0.01;
