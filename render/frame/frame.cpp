@@ -36,7 +36,7 @@ struct FrameRenderer::State {
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options); });
     if (options.ranks) planner.share(plan, options);
-    pipeline.drawLayers(plan, options, statistics);
+    pipeline.drawLayers(plan, options, statistics, progress);
     Image image = pipeline.draw(plan, options, statistics, progress);
     if (options.ranks) joinTiles(image, plan.shared->owners, *options.ranks);
     return image;
@@ -56,7 +56,7 @@ struct FrameRenderer::State {
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear); });
     if (options.ranks) planner.share(plan, clear);
-    pipeline.drawLayers(plan, clear, statistics);
+    pipeline.drawLayers(plan, clear, statistics, progress);
     Image image = pipeline.draw(plan, clear, statistics, progress);
     if (!beside) pipeline.release();
     Image painted = paintValues(camera, clear, {plan, image, beside}, progress);
@@ -109,7 +109,7 @@ struct FrameRenderer::State {
     QuickPlan quick =
         timed(statistics.plan_s, "plan", [&] { return planner.planQuick(camera, options, limits); });
     is_final = quick.isFinal();
-    pipeline.drawLayers(quick.plan, options, statistics);
+    pipeline.drawLayers(quick.plan, options, statistics, progress);
     Image picture = pipeline.draw(quick.plan, options, statistics, progress);
     return quick.size.isWhole() ? picture : quick.size.enlarge(picture);
   }

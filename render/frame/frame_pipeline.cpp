@@ -252,9 +252,21 @@ uint64_t FramePipeline::exchangeBytes(const FrameOptions& options) const {
   return std::clamp(options.memory_bytes / 16, least, most);
 }
 
-void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
-  layers_.draw(
-      plan, options, [&](const SamplingWork& work) { sample(work, options, statistics); }, statistics);
+void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
+                               Progress* progress) {
+  const auto throwIfStopped = [&] {
+    curvisplat::throwIfStopped(options.stop);
+    if (progress) progress->throwIfStopped();
+  };
+  const auto sample = [&](const SamplingWork& work) {
+    SamplingWork stoppable = work;
+    stoppable.take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& splats) {
+      throwIfStopped();
+      work.take(part, cell_min, splats);
+    };
+    this->sample(stoppable, options, statistics);
+  };
+  layers_.draw(plan, options, sample, throwIfStopped, statistics);
 }
 
 void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options,

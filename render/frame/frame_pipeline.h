@@ -64,8 +64,9 @@ class LayerDrawer {
         planner_(planner) {}
 
   /// Draws options.scene, if there is one, and puts its layers into the plan. Adds to `statistics`. Throws
-  /// UsageError where options.memory_bytes does not suffice, and what `sample` throws.
-  void draw(FramePlan& plan, const FrameOptions& options, const Sample& sample, FrameStatistics& statistics);
+  /// UsageError where options.memory_bytes does not suffice, and what `sample` and `throw_if_stopped` throw.
+  void draw(FramePlan& plan, const FrameOptions& options, const Sample& sample,
+            const std::function<void()>& throw_if_stopped, FrameStatistics& statistics);
   /// Gives up the memory that is kept from picture to picture.
   void release() { surface_memory_ = {}; }
 
@@ -117,7 +118,8 @@ class FramePipeline {
                FrameStatistics& statistics, Progress* progress);
   /// Draws the surfaces, slices and isosurfaces of options.scene, if there is one, and puts them into the
   /// plan as its layers. Before draw(), and as draw().
-  void drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
+  void drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
+                  Progress* progress);
 
   /// Begins to fetch the plan's bricks in the background. Throws UsageError if there is too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);

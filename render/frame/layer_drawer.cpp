@@ -78,7 +78,7 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) {
 }
 
 void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sample& sample,
-                       FrameStatistics& statistics) {
+                       const std::function<void()>& throw_if_stopped, FrameStatistics& statistics) {
   if (!options.scene || (options.scene->empty() && options.scene->volume)) {
     surface_memory_ = {};
     return;
@@ -118,7 +118,8 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
                        opacities ? &*opacities : nullptr,
                        of_opacity,
                        isosurfaces ? &*isosurfaces : nullptr,
-                       plan.settings.shadows.get()};
+                       plan.settings.shadows.get(),
+                       throw_if_stopped};
   std::shared_ptr<const PixelLayers> layers;
   arenaOf(options).execute([&] {
     SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);

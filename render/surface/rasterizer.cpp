@@ -37,7 +37,7 @@ void clipToGuard(std::vector<ScreenVertex>& polygon, float ScreenVertex::*axis, 
 }  // namespace
 
 bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row,
-                      const SampleTile* before) {
+                      const SampleTile* before, const std::function<void()>& throw_if_stopped) {
   x0_ = column * kSampleTileWidth;
   y0_ = row * kSampleTileHeight;
   x1_ = std::min(x0_ + kSampleTileWidth, triangles.view().size.width) - 1;
@@ -56,6 +56,7 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
     const std::vector<ScreenVertex>& vertices = triangles.verticesOf(surface);
     size_t taken = 0;
     const auto drawTaken = [&] {
+      if (throw_if_stopped) throw_if_stopped();
       const size_t count = drawSmallTriangles(
           {vertices.data(), mesh.triangles.data(), std::span(numbers).first(std::exchange(taken, 0)),
            triangles.firstOf(surface)},

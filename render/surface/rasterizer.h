@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -24,9 +25,10 @@ class SampleTile {
   SampleTile() : samples_(static_cast<size_t>(kSampleTileWidth) * kSampleTileHeight) {}
 
   /// Draws the triangles that a tile sees; with `before`, of the same tile, those that lie behind what its
-  /// samples see. False if nothing is seen: then samples are undefined.
+  /// samples see. False if nothing is seen: then samples are undefined. `throw_if_stopped`: called every thousand
+  /// triangles, each of which may cover the tile.
   bool draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row,
-            const SampleTile* before = nullptr);
+            const SampleTile* before = nullptr, const std::function<void()>& throw_if_stopped = {});
 
   int x0() const { return x0_; }
   int y0() const { return y0_; }

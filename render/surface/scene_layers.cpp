@@ -373,7 +373,8 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
     const auto column = static_cast<int>(number % columns), row = static_cast<int>(number / columns);
     size_t drawn = 0;
     while (drawn < tiles.size() &&
-           tiles[drawn].draw(triangles, bins, column, row, drawn > 0 ? &tiles[drawn - 1] : nullptr))
+           tiles[drawn].draw(triangles, bins, column, row, drawn > 0 ? &tiles[drawn - 1] : nullptr,
+                             look.throw_if_stopped))
       ++drawn;
     const SampleTile& tile = tiles.front();
     for (int y = tile.y0(); y <= tile.y1(); ++y) {

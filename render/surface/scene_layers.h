@@ -4,6 +4,7 @@
 // The same bits for any number of threads. Parallel on the caller's TBB arena, a tile of samples at a time.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -32,6 +33,7 @@ struct SceneLook {
   std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
   const IsoLayers* isosurfaces = nullptr;
   const ShadowGrid* shadows = nullptr;  // of the volume, on surfaces and isosurfaces
+  std::function<void()> throw_if_stopped = {};  // any thread
 };
 
 /// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread

@@ -15,6 +15,7 @@
 #include "render/frame/frame_memory.h"
 #include "render/sweep/hidden_bricks.h"
 #include "stream/base/error.h"
+#include "stream/base/progress.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/reference/reference_march.h"
 #include "tests/support/expect_error.h"
@@ -135,6 +136,28 @@ TEST_F(ProgressiveTest, CanBeStoppedBetweenItsPicturesAndBeginsFromTheCacheOfBri
   };
   renderer.renderProgressively(iso, options(0.3), statistics, expectWarm);
   EXPECT_EQ(shown, 3);
+}
+
+TEST_F(ProgressiveTest, ASliceOrSurfaceIsStoppedBeforeTheVolumeIsDrawn) {
+  FrameRenderer renderer(*cache_, 0, function());
+  auto mesh = std::make_shared<TriangleMesh>();
+  mesh->positions = {{-9, -9, 0}, {9, -9, 0}, {0, 9, 0}};
+  mesh->normals.assign(3, {0, 0, 1});
+  mesh->triangles = {{0, 1, 2}};
+  SurfaceScene of_slice, of_surface;
+  of_slice.slices.push_back({{0, 0, 0.5}, {0, 0, 1}});
+  of_surface.surfaces.push_back({mesh});
+  for (const SurfaceScene& scene : {of_slice, of_surface}) {
+    Progress progress;
+    progress.stop(15);
+    FrameOptions wanted = options(0.3);
+    wanted.scene = std::make_shared<SurfaceScene>(scene);
+    FrameStatistics statistics;
+    EXPECT_THROW(renderer.render(camera(Projection::kOrthographic), wanted, statistics, &progress),
+                 Interrupted);
+    progress.end();
+    EXPECT_TRUE(progress.phases().empty());
+  }
 }
 
 TEST_F(ProgressiveTest, MoreSplatsMakeABetterPictureAndNeverMoreThanAsked) {

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "render/surface/scene_layers.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 namespace {
@@ -178,6 +179,24 @@ TEST_P(Rasterizer, TheLayersAreTheSameForAnyThreads) {
       }
     }
   EXPECT_GT(layers, 1000u);
+}
+
+TEST_P(Rasterizer, StopsWithinATileOfManyTriangles) {
+  auto mesh = std::make_shared<TriangleMesh>();  // one triangle 100,000 times, which every tile sees
+  mesh->positions = {{-90, -30, 0}, {90, -30, 0}, {0, 90, 0}};
+  mesh->normals.assign(3, {0, 0, 1});
+  mesh->triangles.assign(100'000, {0, 1, 2});
+  SurfaceScene scene;
+  scene.surfaces.push_back({mesh});
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), {8, 8}, glm::dvec3(1.0), kLowPass, 0.1);
+  const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
+  int asked = 0;
+  SceneLook look{colours, {}, {}, 0};
+  look.throw_if_stopped = [&] {
+    if (++asked == 3) throw Interrupted(0, "interrupted");
+  };
+  tbb::task_arena(1).execute([&] { EXPECT_THROW(layersOf(scene, view, {}, look), Interrupted); });
+  EXPECT_EQ(asked, 3);
 }
 
 INSTANTIATE_TEST_SUITE_P(, Rasterizer, testing::Values(Projection::kOrthographic, Projection::kPerspective));
