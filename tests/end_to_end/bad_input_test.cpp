@@ -311,6 +311,7 @@ TEST_F(Suggestions, Values) {
       {{"--size", "100,80"}, "did you mean 100x80?"},
       {{"--size", "100"}, "expected WIDTHxHEIGHT, found 1 number"},
       {{"--step", "3"}, "--step 3: is out of range"},
+      {{"--azimuth", "2e6"}, "--azimuth 2e6: expected degrees from -1e+06 to 1e+06"},
       {{"--orbit", "360"}, "use a name such as frame_%04d.png, or a movie"}};
   for (const auto& [options, meant] : cases) expectMeantByRender(options, meant);
   expectMeant({"render", file("flow.splats"), "-o", file("a.pgn")}, "did you mean .png?");

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <memory>
 #include <system_error>
 #include <utility>
@@ -18,8 +19,13 @@
 namespace curvisplat {
 namespace {
 
-double numberOr(const std::string& option, const std::optional<std::string>& text, double otherwise) {
-  return text ? parseNumber(option, *text) : otherwise;
+/// An angle in degrees, 0 without one. Frames multiply it, so that it must be far from what a double holds.
+double degreesOf(const std::string& option, const std::optional<std::string>& text) {
+  constexpr double kMax = 1e6;
+  const double degrees = text ? parseNumber(option, *text) : 0;
+  if (!(std::abs(degrees) <= kMax))
+    throw UsageError("{} {}: expected degrees from {:g} to {:g}", option, *text, -kMax, kMax);
+  return degrees;
 }
 
 /// The camera before --roll and --zoom. Rolling counts for what fits.
@@ -29,10 +35,10 @@ Camera placedCamera(const CameraArguments& arguments, const ShownBox& box, Image
   if (angle >= 180)
     throw UsageError("--view-angle {}: expected fewer than 180 degrees", *arguments.view_angle);
   const auto turned = [&](const Camera& camera) {
-    return elevated(orbited(camera, numberOr("--azimuth", arguments.azimuth, 0)),
-                    numberOr("--elevation", arguments.elevation, 0));
+    return elevated(orbited(camera, degreesOf("--azimuth", arguments.azimuth)),
+                    degreesOf("--elevation", arguments.elevation));
   };
-  const double roll = numberOr("--roll", arguments.roll, 0);
+  const double roll = degreesOf("--roll", arguments.roll);
 
   Camera camera;
   if (arguments.position) {
@@ -103,7 +109,7 @@ void checkCameraArguments(const CameraArguments& arguments) {
   for (const auto& [name, value] : {std::pair("--azimuth", &arguments.azimuth),
                                     {"--elevation", &arguments.elevation},
                                     {"--roll", &arguments.roll}})
-    numberOr(name, *value, 0);
+    degreesOf(name, *value);
   if (arguments.zoom) parsePositive("--zoom", *arguments.zoom);
   if (!arguments.path.empty() && (arguments.turn() || arguments.zoom))
     throw UsageError(
@@ -133,8 +139,7 @@ CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox
     return motion;
   }
   Camera first = placedCamera(arguments, box, size);
-  const double degrees = numberOr("--orbit", arguments.orbit, 0),
-               roll = numberOr("--roll", arguments.roll, 0);
+  const double degrees = degreesOf("--orbit", arguments.orbit), roll = degreesOf("--roll", arguments.roll);
   const double zoom = arguments.zoom ? parsePositive("--zoom", *arguments.zoom) : 1;
   if (first.projection == Projection::kPerspective && !(first.view_angle_deg / zoom < 180))
     throw UsageError("--zoom {}: the view angle of {:g} degrees becomes {:g}; expected fewer than 180",
