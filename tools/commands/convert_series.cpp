@@ -200,8 +200,8 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   const std::vector<uint64_t> places = placesOfPart(part, steps.size());
   SeriesOptions options = seriesOptions(arguments);
   const std::filesystem::path folder = partsFolder(options.convert.output);
-  makePartsFolder(folder);
   if (places.empty()) {
+    makePartsFolder(folder);
     writePartRecord(folder, part, steps.size(), {});
     Progress nothing;
     writeSeriesStatistics(arguments, {}, StepLog(nothing), nothing);
@@ -216,7 +216,10 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   input.places = places;
   options.convert.output = partCache(folder, part);
   options.to_part = part.index > 0;
-  options.before_change = [&] { removePartRecord(folder, part); };
+  options.before_change = [&] {
+    makePartsFolder(folder);  // not before: wrong usage leaves nothing
+    removePartRecord(folder, part);
+  };
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   StepLog log(progress);
