@@ -344,6 +344,21 @@ class Messages(FormatCase):
         self.assertNotIn("valid_min", printed)
         self.assertNotIn("-nan", printed + self.run_program("convert", self.folder / "a.nc", "-o", self.folder / "a.splats").stderr)
 
+    def test_a_list_of_a_thousand_names_is_cut(self):
+        values = "".join(f"v{n} 1 8 float\n0 1 2 3 4 5 6 7\n" for n in range(1000))
+        path = self.write("many.vtk", "# vtk DataFile Version 3.0\nmany\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
+                          f"SPACING 1 1 1\nPOINT_DATA 8\nFIELD FieldData 1000\n{values}")
+        printed = self.run_program("convert", path, "-o", self.folder / "many.splats").stderr
+        self.assertRegex(printed, "left out: v16, v17, .*, v55 and 944 more; choose scalars with --scalar NAME,NAME")
+
+    def test_wrong_usage_of_a_part_leaves_no_folder(self):
+        self.run_program("generate", "wake", "--size", "5x4x3", "--steps", "2", "-o", self.folder / "w")
+        before = sorted(self.folder.iterdir())
+        done = subprocess.run([PROGRAM, "convert", "w.xyz", "w_%04d.fun", "-o", "w.splats", "--part", "1/2", "--gamma", "0"], cwd=self.folder,
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertEqual(sorted(self.folder.iterdir()), before)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -160,14 +160,23 @@ std::vector<std::string> splitAtCommas(const std::string& text) {
   return parts;
 }
 
+/// The first of very many names.
+std::string someOf(const std::vector<std::string>& names) {
+  constexpr size_t kListed = 40;
+  const size_t count = names.size() > kListed + 1 ? kListed : names.size();
+  std::string text =
+      fmt::format("{}", fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(count), ", "));
+  if (count < names.size()) text += fmt::format(" and {} more", names.size() - count);
+  return text;
+}
+
 /// Scalars that are not converted unasked, by the reason.
 struct LeftOut {
   std::vector<std::string> other_centring, others;
 
   void printNotes(Centring centring) const {
     const auto print = [](const std::vector<std::string>& names, const std::string& why) {
-      if (!names.empty())
-        printMessage("note: left out: {}{} --scalar NAME,NAME", fmt::join(names, ", "), why);
+      if (!names.empty()) printMessage("note: left out: {}{} --scalar NAME,NAME", someOf(names), why);
     };
     const bool cells = centring == Centring::kCell;
     print(other_centring,
