@@ -7,8 +7,6 @@ of threads and of ranks, and any memory. Usually OpenFOAM and UGRID, all with CU
 """
 import hashlib
 import json
-import pathlib
-import shutil
 import subprocess
 import unittest
 
@@ -27,12 +25,10 @@ import mesh_su2_test
 import mesh_tecplot_test
 import mesh_xdmf_test
 import vtkhdf_test
-from sweep import IS_WHOLE, ONLY_WHOLE, some_of
+from sweep import IS_WHOLE, ONLY_WHOLE, mpirun, some_of
 
 CELLS_OF_A_CHUNK = 16384  # preprocess/gather/mesh_reader.cpp
 SIDE = 26  # 17,576 cubes
-MPIRUN = ["mpirun", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-q", "-n", "3"]
-HAS_RANKS = shutil.which("mpirun") and pathlib.Path(PROGRAM).with_name("curvisplat-mpi.so").exists()
 
 
 class MeshBytes(MeshFormats):
@@ -57,8 +53,8 @@ class MeshBytes(MeshFormats):
             with self.subTest(scalar=scalar):
                 first = self.bytes_of(paths, scalar, options=("--threads", "1", "--memory", "192M"))
                 self.assertEqual(self.bytes_of(paths, scalar, options=("--threads", "4", "--memory", "1G")), first)
-                if HAS_RANKS:
-                    self.assertEqual(self.bytes_of(paths, scalar, MPIRUN, ("--memory", "256M")), first)
+                if mpirun(PROGRAM):
+                    self.assertEqual(self.bytes_of(paths, scalar, mpirun(PROGRAM), ("--memory", "256M")), first)
 
     def test_openfoam(self):
         writer = self.writer(mesh_foam_test.MeshFoam)

@@ -16,7 +16,7 @@ import unittest
 import zipfile
 
 from model_files import PROGRAM, RANDOM, ModelFileTest, netCDF4, np
-from sweep import some_of
+from sweep import mpirun, some_of
 from zarr_stores import Store
 
 try:
@@ -224,15 +224,18 @@ class ZarrStores(ModelFileTest):
 
     def test_conversion(self):
         self.store(3, of_temp=dict(chunks=(1, 3, 5, 6), shards=(1, 9, 20, 24), codecs=("zstd",)), of_packed=dict(_FillValue=-32768))
-        for source in ("file.nc", "a.zarr"):
-            subprocess.run([PROGRAM, "convert", source, "-o", f"{source}.splats", "--scalar", "all", "--steps", "all"],
+        made = {}
+        for source, start in (("file.nc", ()), ("a.zarr", ()), ("a.zarr", mpirun(PROGRAM))):
+            subprocess.run([*start, PROGRAM, "convert", source, "-o", "made.splats", "--overwrite", "--scalar", "all", "--steps", "all"],
                            cwd=self.folder, check=True, capture_output=True)
-        folders = [self.folder / f"{source}.splats" for source in ("file.nc", "a.zarr")]
-        names = [sorted(file.relative_to(folder) for file in folder.rglob("*") if file.is_file()) for folder in folders]
-        self.assertEqual(*names)
-        for name in names[0]:
-            if name.suffix != ".json":
-                self.assertEqual(*((folder / name).read_bytes() for folder in folders), name)
+            files = [file for file in (self.folder / "made.splats").rglob("*") if file.is_file() and file.suffix != ".json"]
+            made[source, len(start)] = {file.name: file.read_bytes() for file in files}
+        first, *others = made.values()
+        self.assertIn("geometry.bin", first)
+        for other in others:
+            self.assertEqual(other.keys(), first.keys())
+            for name in first:
+                self.assertEqual(other[name], first[name], name)
 
     def test_a_series_of_stores(self):
         for step in range(2):

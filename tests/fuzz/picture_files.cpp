@@ -174,7 +174,7 @@ const RegisteredFuzzTarget mesh_target("mesh", fuzzMesh);
 void fuzzCurveText(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   const auto choice = input.take<uint8_t>();
-  const std::string text = textOf(input.rest());
+  const std::string text(textOf(input.rest()));
   const Globe globe;
   const CurveSet set = (choice & 4) != 0 ? parseGeoJson(text, "a.geojson", globe, {})
                        : (choice & 8) != 0
