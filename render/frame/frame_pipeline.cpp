@@ -187,6 +187,13 @@ bool FramePipeline::sweepNext(const FramePlan& plan, const FrameOptions& options
   return pools_->sweep.beginSlab(plan.parts);
 }
 
+/// The part as it is fetched. No layers are merged where the painter keeps bricks, or the picture would depend on which.
+BrickPart FramePipeline::fetchedPart(const SweptPart& swept) const {
+  BrickPart part = swept.part;
+  if (is_storing_) part.merging = 0;
+  return part;
+}
+
 /// Starts the stages on the sweep's slab, of `region`; null: there is none. False if no rank has one.
 bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, const FrameOptions& options) {
   if (exchange_ ? !beginExchangedSlab(region) : region == nullptr) return false;
@@ -202,7 +209,7 @@ bool FramePipeline::startSlab(const FramePlan& plan, const FrameRegion* region, 
     pools_->source.start(
         parts, [this](uint32_t brick) { return exchange_->isUnneeded(brick); }, plan.mergings);
   } else {
-    for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
+    for (const uint32_t number : pools_->sweep.parts()) parts.push_back(fetchedPart(plan.parts[number]));
     pools_->source.start(
         parts, [&](uint32_t brick) { return isLeftOut(brick, plan, options); }, plan.mergings);
   }
@@ -424,6 +431,12 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.card_peak_bytes = card.bytes;
     if (!stored_.empty()) add(statistics, painter.store()->counts());
   });
+  if (const ShadowGrid* const shadows = plan.settings.shadows.get()) {
+    PrepareStatistics unreadable;
+    for (const auto& [brick, reason] : shadows->damaged())
+      unreadable.bricks_unreadable.push_back({brick, reason});
+    combine(statistics, unreadable);
+  }
   return image;
 }
 
@@ -437,7 +450,7 @@ void FramePipeline::prefetch(const FramePlan& plan, const FrameOptions& options)
   endPrefetch();
   makePools(options);
   std::vector<BrickPart> parts;
-  for (const SweptPart& part : plan.parts) parts.push_back(part.part);
+  for (const SweptPart& part : plan.parts) parts.push_back(fetchedPart(part));
   pools_->source.startPrefetch(parts, plan.mergings);
   pools_->workers.startPrefetch();
 }

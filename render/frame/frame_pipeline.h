@@ -152,6 +152,7 @@ class FramePipeline {
   void fillStore(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
   void putIntoStore(std::span<const StoredPart> parts, const BorderStyle& borders,
                     const FrameOptions& options, FrameStatistics& statistics);
+  BrickPart fetchedPart(const SweptPart& swept) const;
   bool isLeftOut(uint32_t brick, const FramePlan& plan, const FrameOptions& options) const;
   void makePools(const FrameOptions& options);
   void dropPools();
@@ -172,6 +173,7 @@ class FramePipeline {
   std::vector<StoredPart> stored_;           // the parts of the plan that are drawn from the store
   std::vector<uint8_t> is_stored_;           // [part of the plan]; empty: none is
   std::vector<uint32_t> unread_;             // stored bricks, sorted
+  bool is_storing_ = false;                  // whether the last picture's painter has a store for its bricks
   std::unique_ptr<SplatExchange> exchange_;  // of the frame; null: this process alone
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn

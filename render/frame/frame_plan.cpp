@@ -127,7 +127,7 @@ void FramePlanner::setTransferFunction(const TransferFunction& transfer_function
   forgetFunctions();
 }
 
-/// What was made of the functions that the pictures had.
+/// Forgets what was made of the functions that the pictures had.
 void FramePlanner::forgetFunctions() {
   const MutexLock lock(mutex_);
   mergings_ = LayerMergings();
@@ -153,12 +153,14 @@ std::shared_ptr<const GradientOpacity> FramePlanner::gradientOf(const FrameOptio
 std::shared_ptr<const ShadowGrid> FramePlanner::shadowsOf(const ProjectionSettings& settings,
                                                           const FrameOptions& options) const {
   if (!options.light || !options.light->hasShadows()) return nullptr;
-  const ShadowScene scene{*options.light, options.scale, settings.clip_planes, settings.gradient.get()};
+  const ShadowScene scene{*options.light, options.scale, settings.clip_planes, settings.gradient.get(),
+                          options.keep_going};
   std::vector<double> key = ShadowGrid::keyOf(scene);
   for (const OpacityPoint& point : options.gradient_opacity)
     for (const double of : {point.x, point.opacity, point.midpoint, point.sharpness}) key.push_back(of);
   const MutexLock lock(mutex_);
   if (!shadows_.grid || shadows_.key != key) {
+    shadows_ = {};
     tbb::task_arena arena(
         std::min(static_cast<int>(threadsOrCores(options.threads)), tbb::info::default_concurrency()));
     std::shared_ptr<const ShadowGrid> grid;

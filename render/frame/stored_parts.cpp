@@ -24,9 +24,9 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
   stored_.clear();
   is_stored_.clear();
   unread_.clear();
-  if (painting_ != backend_.get() || options.ranks || options.keep_going || coloured_by_ ||
-      !BrickStore::canDraw(plan.settings))
-    return;
+  if (painting_ != backend_.get()) return;  // after a picture of the same splats
+  is_storing_ = false;
+  if (options.ranks || options.keep_going || coloured_by_ || !BrickStore::canDraw(plan.settings)) return;
   std::vector<uint32_t> numbers;
   for (uint32_t number = 0; number < plan.parts.size(); ++number) {
     const SweptPart& part = plan.parts[number];
@@ -43,6 +43,7 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
     painting_->run([&](Painter& painter) {
       BrickStore* const store = painter.store();
       const uint64_t bytes = store ? options.card_memory_bytes.value_or(store->defaultBytes()) : 0;
+      is_storing_ = bytes > 0;
       if (store) store->open(content_);
       const size_t fitting = store ? store->makeRoom(stored_, bytes) : 0;
       stored_.erase(stored_.begin() + static_cast<std::ptrdiff_t>(fitting), stored_.end());

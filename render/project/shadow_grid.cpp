@@ -17,6 +17,7 @@ namespace {
 constexpr uint64_t kMinSplatsOfLevel = 100'000;  // of the level; eight times as many at most
 constexpr int kMaxPoints = 6;                    // of a splat, along an axis
 constexpr double kOcclusionReach = 0.125;        // diagonals of the data
+constexpr double kMaxAmount = 1e24;              // sums of a million are finite in single precision
 
 /// Lattice cells are cubes in stretched space, except in thin data.
 ShadowLattice latticeOver(const glm::dvec3& lower, const glm::dvec3& upper, const glm::dvec3& scale) {
@@ -39,10 +40,11 @@ class ExtinctionLattice {
   ExtinctionLattice(const ShadowLattice& lattice, const glm::dvec3& scale)
       : lattice_(lattice), scale_(scale), extinctions_(lattice.size(), 0.0f) {}
 
-  /// Adds the splats of a level.
-  void add(const CacheReader& cache, size_t variable, const ClassificationTable& table,
-           const ShadowScene& scene);
-  /// Replaces the sums of extinction times volume by extinctions. Nodes on faces have less of the volume.
+  /// Adds the splats of a level. Returns the damaged bricks that it has left out.
+  std::vector<std::pair<uint32_t, std::string>> add(const CacheReader& cache, size_t variable,
+                                                    const ClassificationTable& table,
+                                                    const ShadowScene& scene);
+  /// Replaces the sums by extinctions: nodes on faces have less of the volume.
   void divide();
   /// [node] the optical depth from there in the direction `towards`, stretched, of length 1, as far as `reach`
   /// or the box's end.
@@ -128,8 +130,12 @@ struct CellPoints {
   std::array<int, 3> along{};
 };
 
-void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const ClassificationTable& table,
-                            const ShadowScene& scene) {
+std::vector<std::pair<uint32_t, std::string>> ExtinctionLattice::add(const CacheReader& cache,
+                                                                     size_t variable,
+                                                                     const ClassificationTable& table,
+                                                                     const ShadowScene& scene) {
+  const double cell = lattice_.edge.x * lattice_.edge.y * lattice_.edge.z;
+  std::vector<std::pair<uint32_t, std::string>> damaged;
   const glm::vec3 per_scale(1.0 / scale_);
   const auto is_clipped = [&](const glm::dvec3& at) {
     return std::any_of(scene.clip_planes.begin(), scene.clip_planes.end(),
@@ -144,8 +150,10 @@ void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const Cla
     try {
       cache.readGeometry(brick, geometry);
       cache.readVariable(brick, variable, values);
-    } catch (const DamagedBrick&) {
-      continue;  // drawing it reports it
+    } catch (const DamagedBrick& error) {
+      if (!scene.leave_out_damaged) throw;
+      damaged.emplace_back(brick, error.what());
+      continue;
     }
     const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[brick].cell);
     for (size_t i = 0; i < geometry.size(); ++i) {
@@ -154,7 +162,7 @@ void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const Cla
       const Slope slope{values.slope0[i], values.slope1[i], values.slope2[i]};
       const glm::dvec3 w(slope.w0, slope.w1, slope.w2);
       const CellPoints points(shape, lattice_.edge);
-      double volume = double{geometry.weight[i]} / points.count();
+      double volume = geometry.weight[i] / cell / points.count();  // of lattice cells
       if (scene.gradient)
         volume *= double{scene.gradient->of(glm::length(gradientOf(shape, slope, per_scale)))};
       if (!(volume > 0 && std::isfinite(volume))) continue;
@@ -166,21 +174,21 @@ void ExtinctionLattice::add(const CacheReader& cache, size_t variable, const Cla
       for (int n = 0; n < points.count(); ++n) {
         const glm::dvec3 place = points.placeOf(n), at = centre + points.offsetOf(place);
         const double extinction = table.mean(double{values.mean[i]} + glm::dot(w, place), half_width).w;
-        if (extinction > 0 && !is_clipped(at)) addBox(at, half, extinction * volume);
+        if (extinction > 0 && !is_clipped(at)) addBox(at, half, std::min(extinction * volume, kMaxAmount));
       }
     }
   }
+  return damaged;
 }
 
 void ExtinctionLattice::divide() {
   const auto& [columns, rows, layers] = lattice_.nodes;
-  const double volume = lattice_.edge.x * lattice_.edge.y * lattice_.edge.z;
   const auto shareOf = [](int n, int nodes) { return n == 0 || n == nodes - 1 ? 0.5 : 1.0; };
   for (int k = 0; k < layers; ++k)
     for (int j = 0; j < rows; ++j)
       for (int i = 0; i < columns; ++i)
         extinctions_[lattice_.index(i, j, k)] /=
-            static_cast<float>(volume * shareOf(i, columns) * shareOf(j, rows) * shareOf(k, layers));
+            static_cast<float>(shareOf(i, columns) * shareOf(j, rows) * shareOf(k, layers));
 }
 
 /// The trapezoidal rule from one layer of nodes to the next, across the axis along which the ray passes most
@@ -258,9 +266,10 @@ std::vector<double> ShadowGrid::keyOf(const ShadowScene& scene) {
   const auto add = [&key](const glm::dvec3& of) {
     for (int axis = 0; axis < 3; ++axis) key.push_back(of[axis]);
   };
-  add(light.towards.value_or(glm::dvec3(0.0)));
-  add({light.shadow, light.ambient_occlusion, 0});
+  add(light.shadow > 0 ? light.towards.value_or(glm::dvec3(0.0)) : glm::dvec3(0.0));
+  add({light.shadow, light.ambient_occlusion, scene.leave_out_damaged});
   add(scene.scale);
+  key.push_back(static_cast<double>(scene.clip_planes.size()));
   for (const ClipPlane& plane : scene.clip_planes) {
     add(plane.point);
     add(plane.normal);
@@ -275,7 +284,7 @@ ShadowGrid::ShadowGrid(const CacheReader& cache, size_t variable, const Classifi
   const Light& light = scene.light;
   const glm::dvec3 stretched = scene.scale * (cache.manifest().upper - cache.manifest().lower);
   ExtinctionLattice extinctions(lattice_, scene.scale);
-  extinctions.add(cache, variable, table, scene);
+  damaged_ = extinctions.add(cache, variable, table, scene);
   extinctions.divide();
   if (light.ambient_occlusion > 0) {
     const std::vector<glm::dvec3> directions = directionsAround();

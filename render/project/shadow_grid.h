@@ -16,6 +16,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "render/colour/classification.h"
@@ -33,6 +35,7 @@ struct ShadowScene {
   glm::dvec3 scale{1.0};
   std::vector<ClipPlane> clip_planes;         // what is outside of them casts none
   const GradientOpacity* gradient = nullptr;  // null: 1
+  bool leave_out_damaged = false;             // false: a damaged brick is an error
 };
 
 /// A lattice of nodes over the data's box, those at its ends on the faces. The first axis runs fastest.
@@ -94,25 +97,29 @@ class LocalShadows {
 class ShadowGrid {
  public:
   static constexpr int kMaxNodes = 81, kMinNodes = 17;  // along an axis
-  /// The memory in bytes of building a grid, which keeps a third of the lattices.
-  static constexpr uint64_t kBytes = uint64_t{kMaxNodes} * kMaxNodes * kMaxNodes * 3 * sizeof(float) +
-                                     uint64_t{kMaxBrickSplats} * 20 * sizeof(float);
+  /// The memory in bytes of building a grid, while pictures may still have the last one.
+  static constexpr uint64_t kBytes = uint64_t{kMaxNodes} * kMaxNodes * kMaxNodes * 4 * sizeof(float) +
+                                     uint64_t{kMaxBrickSplats} * 20 * sizeof(float) +
+                                     (12 << 20);  // what reading keeps on its thread
 
   /// A key by which a grid is known again: all of the scene but its gradient, which the caller compares, as
   /// the table and the cache.
   static std::vector<double> keyOf(const ShadowScene& scene);
 
-  /// The scene's light has shadows. Damaged bricks are left out; throws Error if the disk fails. Parallel on
-  /// the caller's TBB arena.
+  /// The scene's light has shadows. Throws DamagedBrick unless such bricks are left out, and Error if the disk
+  /// fails. Parallel on the caller's TBB arena.
   ShadowGrid(const CacheReader& cache, size_t variable, const ClassificationTable& table,
              const ShadowScene& scene);
 
   LocalShadows local(const glm::dvec3& origin) const { return {lattice_, arriving_.data(), origin}; }
   float at(const glm::dvec3& data) const { return local(data).at(0, 0, 0); }
+  /// The damaged bricks, which cast no shadow, with one line each that says why.
+  const std::vector<std::pair<uint32_t, std::string>>& damaged() const { return damaged_; }
 
  private:
   ShadowLattice lattice_;
   std::vector<float> arriving_;
+  std::vector<std::pair<uint32_t, std::string>> damaged_;
 };
 
 }  // namespace curvisplat

@@ -221,9 +221,9 @@ bool writeMerged(size_t first, std::span<const uint32_t> next, size_t at, double
 
 uint16_t ScalarBins::of(float value) const {
   const double v = log_scale ? std::log(std::max(value, std::numeric_limits<float>::min())) : double{value};
-  const double position =
-      std::clamp(std::floor(scale * v + bias), -1.0, static_cast<double>(bins.size() - 2));
-  return bins[static_cast<size_t>(position + 1)];
+  const double position = std::floor(scale * v + bias);
+  if (!(position >= 0)) return bins.front();
+  return bins[std::min(static_cast<size_t>(std::min(position, 1e9)) + 1, bins.size() - 1)];
 }
 
 /// Links the splats of each layer: next_.
@@ -239,7 +239,7 @@ void LayerMerger::findLayers(const LayerMerging& merging, const SplatGeometry& g
     const auto layer = Layer::of(Factor::of(g, n), per_voxel);
     if (!layer) continue;
     const glm::dvec3 position = per_voxel * positionOf(g, n), at = glm::max(position, 0.0);
-    if (!(std::max({at.x, at.y, at.z}) < kMaxVoxels)) continue;
+    if (!(at.x < kMaxVoxels && at.y < kMaxVoxels && at.z < kMaxVoxels)) continue;
     const auto whole = [](double voxels) { return static_cast<uint64_t>(voxels); };
     const uint32_t second_bin = second && merging.second_bins ? merging.second_bins->of(second->mean[n]) : 0u;
     keys_[n] = {whole(at.x) | whole(at.y) << 20 | whole(at.z) << 40,

@@ -50,7 +50,7 @@ class LayerMerger {
   void findLayers(const LayerMerging& merging, const SplatGeometry& geometry, const SplatVariable& values,
                   const SplatVariable* second);
 
-  /// What splats that are merged have in common.
+  /// Splats are merged if their keys are equal.
   struct Key {
     uint64_t voxel;  // its place
     uint32_t bins;   // of both scalars

@@ -89,9 +89,10 @@ class Fidelity : public ProgramSuite<Fidelity> {
   }
 
   /// Expects a least fidelity of the processor's painter from the finest level and from the root alone, and
-  /// that detail never costs any.
+  /// that detail never costs any but what layers of thin cells lose that are merged, which no one sees.
   static void expectPsnr(const std::string& name, double least_db, double least_of_root_db) {
     const Image& reference = knownReference(name, kSize);
+    constexpr double kLayersDb = 0.3, kUnseenDb = 60;
     double coarser_db = least_of_root_db;
     for (const char* lod_pixels : {"1000", "8", "4", "2", "0"}) {
       render("half-annulus", name, file(name + ".pfm"), {"--backend", "cpu", "--stats", file("stats.json")},
@@ -104,7 +105,8 @@ class Fidelity : public ProgramSuite<Fidelity> {
       if (lod_pixels == std::string("1000")) {
         EXPECT_EQ(stats["largest_level"], 0);
       }
-      const double expected_db = lod_pixels == std::string("0") ? std::max(least_db, coarser_db) : coarser_db;
+      const double expected_db = lod_pixels == std::string("0") ? std::max(least_db, coarser_db)
+                                                                : std::min(coarser_db - kLayersDb, kUnseenDb);
       EXPECT_GE(psnr_db, expected_db - 1e-6) << "at " << lod_pixels << " pixels";
       if (psnr_db < expected_db - 1e-6) leavePictures(name, picture, reference);
       coarser_db = psnr_db;

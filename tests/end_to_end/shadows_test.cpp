@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <random>
@@ -275,6 +276,31 @@ TEST_F(Shadows, AreThoseOfTheReferenceMarch) {
       options.light = lit;
     }
   }
+}
+
+TEST_F(Shadows, ADamagedBrickIsAnErrorOrLeftOutAndNamed) {
+  const ProjectionSettings settings = [] {
+    ProjectionSettings made;
+    made.light = lightFrom({0, 0, 1}, 1);
+    return made;
+  }();
+  EXPECT_TRUE(gridOf(settings).damaged().empty());
+  {
+    std::fstream file(cache_->geometryPath(), std::ios::in | std::ios::out | std::ios::binary);
+    for (const Brick& brick : cache_->bricks()) {
+      file.seekp(static_cast<std::streamoff>(brick.geometry.offset));
+      file.put('\x55').put('\x5a').put('\xa5');
+    }
+  }
+  cache_ = std::make_unique<CacheReader>(folder_ / "box.splats");
+  EXPECT_THROW(gridOf(settings), DamagedBrick);
+  ShadowScene scene;
+  scene.light = *settings.light;
+  scene.leave_out_damaged = true;
+  const ShadowGrid grid(*cache_, 0, *table_, scene);
+  ASSERT_FALSE(grid.damaged().empty());
+  EXPECT_NE(grid.damaged().front().second, "");
+  EXPECT_EQ(grid.at(0.5 * kBox), 1);  // nothing is left that casts a shadow
 }
 
 }  // namespace

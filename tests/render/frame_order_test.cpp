@@ -213,7 +213,9 @@ TEST_P(FrameOrderTest, IsThatOfOneSortWithClipPlanesAndLight) {
 // Thin cells, 200 times as long as thick, of whose layers several lie in a pixel.
 TEST_P(FrameOrderTest, MergesLayersOfThinCellsToOnePictureInAnyMemoryWithAnyThreads) {
   if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
-  convertGrid(SceneGridSource(makeScene("boundary-layer"), {48, 40, 48}), *folder_ / "layers.splats");
+  const SceneGridSize dims =
+      GetParam() == Backend::kCpu ? SceneGridSize{48, 40, 48} : SceneGridSize{24, 20, 48};
+  convertGrid(SceneGridSource(makeScene("boundary-layer"), dims), *folder_ / "layers.splats");
   const CacheReader cache(*folder_ / "layers.splats");
   const TransferFunction transfer_function = function(cache);
   FrameRenderer renderer(cache, 0, transfer_function, GetParam());
