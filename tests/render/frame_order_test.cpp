@@ -214,7 +214,7 @@ TEST_P(FrameOrderTest, IsThatOfOneSortWithClipPlanesAndLight) {
 TEST_P(FrameOrderTest, MergesLayersOfThinCellsToOnePictureInAnyMemoryWithAnyThreads) {
   if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
   const SceneGridSize dims =
-      GetParam() == Backend::kCpu ? SceneGridSize{48, 40, 48} : SceneGridSize{24, 20, 48};
+      GetParam() == Backend::kCpu ? SceneGridSize{48, 40, 48} : SceneGridSize{16, 40, 16};
   convertGrid(SceneGridSource(makeScene("boundary-layer"), dims), *folder_ / "layers.splats");
   const CacheReader cache(*folder_ / "layers.splats");
   const TransferFunction transfer_function = function(cache);
@@ -232,7 +232,7 @@ TEST_P(FrameOrderTest, MergesLayersOfThinCellsToOnePictureInAnyMemoryWithAnyThre
       wanted.memory_bytes = memory;
       wanted.threads = threads;
       EXPECT_EQ(renderer.render(camera, wanted, statistics).rgba, expected.rgba) << memory << ' ' << threads;
-      EXPECT_LT(statistics.splats_drawn, 0.6 * static_cast<double>(stored));
+      EXPECT_LT(statistics.splats_drawn, 0.75 * static_cast<double>(stored));
     }
   wanted.light.emplace();  // shows the splats themselves
   renderer.render(camera, wanted, statistics);

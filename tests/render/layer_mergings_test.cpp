@@ -42,7 +42,7 @@ TEST(LayerMergings, IsTheSameUntilSomethingChanges) {
   const ClassificationTable table = ramp(1);
   LayerMergings mergings;
   const auto first = mergings.of(1, {table, nullptr, glm::dvec3(1.0)});
-  EXPECT_EQ(first, mergings.of(1.05, {table, nullptr, glm::dvec3(1.0)}));
+  EXPECT_EQ(first, mergings.of(1.02, {table, nullptr, glm::dvec3(1.0)}));
   const auto longer = mergings.of(1.3, {table, nullptr, glm::dvec3(1.0)});
   EXPECT_NE(first->number, longer->number);
   EXPECT_NE(first->number, mergings.of(1, {table, nullptr, glm::dvec3(1, 1, 2)})->number);
