@@ -134,6 +134,12 @@ void FramePlanner::forgetFunctions() {
   shadows_ = {};
 }
 
+void runOnThreadsOf(const FrameOptions& options, const std::function<void()>& work) {
+  tbb::task_arena arena(
+      std::min(static_cast<int>(threadsOrCores(options.threads)), tbb::info::default_concurrency()));
+  arena.execute(work);
+}
+
 ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
                         ImageSize size) {
   const double diagonal = glm::length(options.scale * (manifest.upper - manifest.lower));
@@ -161,10 +167,9 @@ std::shared_ptr<const ShadowGrid> FramePlanner::shadowsOf(const ProjectionSettin
   const MutexLock lock(mutex_);
   if (!shadows_.grid || shadows_.key != key) {
     shadows_ = {};
-    tbb::task_arena arena(
-        std::min(static_cast<int>(threadsOrCores(options.threads)), tbb::info::default_concurrency()));
     std::shared_ptr<const ShadowGrid> grid;
-    arena.execute([&] { grid = std::make_shared<const ShadowGrid>(cache_, variable_, table_, scene); });
+    runOnThreadsOf(options,
+                   [&] { grid = std::make_shared<const ShadowGrid>(cache_, variable_, table_, scene); });
     shadows_ = {std::move(key), std::move(grid)};
   }
   return shadows_.grid;

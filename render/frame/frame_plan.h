@@ -35,6 +35,9 @@
 
 namespace curvisplat {
 
+/// Runs work that is parallel by TBB, with as many threads as the options say. Waits for it.
+void runOnThreadsOf(const FrameOptions& options, const std::function<void()>& work);
+
 /// The projection for a frame of `size` pixels of a cache with this manifest. Throws UsageError as
 /// ScreenView::of() does.
 ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,

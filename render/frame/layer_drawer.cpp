@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <tbb/info.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <memory>
 #include <utility>
@@ -35,11 +32,6 @@ uint64_t isoSplatBytes(const FrameOptions& options) {
 uint64_t isoTracerBytes(const FrameOptions& options) {
   constexpr uint64_t kTracerBytes = 2 << 20;
   return std::max(kTracerBytes * threadsOrCores(options.threads), options.memory_bytes / 16);
-}
-
-tbb::task_arena arenaOf(const FrameOptions& options) {
-  return tbb::task_arena(
-      std::min(static_cast<int>(threadsOrCores(options.threads)), tbb::info::default_concurrency()));
 }
 
 /// The bricks of a slice that this rank samples.
@@ -121,7 +113,7 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
                        plan.settings.shadows.get(),
                        throw_if_stopped};
   std::shared_ptr<const PixelLayers> layers;
-  arenaOf(options).execute([&] {
+  runOnThreadsOf(options, [&] {
     SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
     for (Surface& surface : curveSurfaces(scene, view)) scene.surfaces.push_back(std::move(surface));
     layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, &surface_memory_));
@@ -175,7 +167,7 @@ std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const F
     }
     statistics.iso_splats += splats.count();
     const StageTimer timer(statistics.surfaces_s, "draw isosurfaces");
-    arenaOf(options).execute([&] {
+    runOnThreadsOf(options, [&] {
       splats.sort();
       layers.draw(splats, look, isoTracerBytes(options));
     });
