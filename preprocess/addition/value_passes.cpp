@@ -119,7 +119,7 @@ std::vector<IndexPlane> planesOf(const CacheReader& cache) {
     const uint64_t nodes[] = {block.ni, block.nj, block.nk};
     // At an end it may be a side that folds upon itself, which is found again.
     if (face.index > 0 && face.index + 1 < nodes[face.axis])
-      planes.push_back({face.block, face.axis, face.index});
+      planes.push_back({face.block, face.axis, face.index, true});
   }
   return planes;
 }
@@ -128,7 +128,7 @@ std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryP
                                           Progress& progress) {
   if (!FacesReader::open(job.cache.path(), job.cache.manifest())) return std::nullopt;
   const std::vector<IndexPlane> planes = planesOf(job.cache);
-  plan.requireFaces(memoryOfFaces(job.reader.source().description().blocks, planes));
+  plan.requireFaces(memoryOfFaces(job.reader.source().description(), planes));
   const std::filesystem::path output = job.cache.cachePath() / job.name;
   removeAll(output);  // a killed program's
   try {

@@ -141,7 +141,7 @@ ConvertReport convertScalars(const DataSource& source, ConvertOptions options, P
   }
   if (options.surfaces) {
     checkPlanes(source.description(), options.planes);
-    plan.requireFaces(memoryOfFaces(source.description().blocks, options.planes));
+    plan.requireFaces(memoryOfFaces(source.description(), options.planes));
   }
   std::vector<ConversionFact> facts =
       factsOf(source.description(), options.scalars, options.blank_value, options.overlap);
@@ -194,7 +194,7 @@ uint64_t times(uint64_t count, double factor) {
 SampleScale SampleScale::of(const GridDescription& whole, const GridDescription& sample,
                             const ConvertOptions& options) {
   const auto of_faces = [&](const GridDescription& grid, std::span<const IndexPlane> planes) {
-    return static_cast<double>(temporaryBytesOfFaces(grid.blocks, planes, options.scalars.size()));
+    return static_cast<double>(temporaryBytesOfFaces(grid, planes, options.scalars.size()));
   };
   return {static_cast<double>(nodesOf(whole)) / static_cast<double>(nodesOf(sample)),
           of_faces(whole, options.planes) / of_faces(sample, {})};

@@ -19,10 +19,10 @@ std::array<uint64_t, 3> sizeOf(const GridBlock& block) {
 }
 
 /// All faces that may be drawn, block after block: blocks without volume have none.
-std::vector<GridFace> facesOf(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes) {
+std::vector<GridFace> facesOf(const GridDescription& grid, std::span<const IndexPlane> planes) {
   std::vector<GridFace> faces;
-  for (uint32_t block = 0; block < blocks.size(); ++block) {
-    const std::array<uint64_t, 3> size = sizeOf(blocks[block]);
+  for (uint32_t block = 0; block < grid.blocks.size(); ++block) {
+    const std::array<uint64_t, 3> size = sizeOf(grid.blocks[block]);
     if (std::any_of(size.begin(), size.end(), [](uint64_t n) { return n < 2; })) continue;
     const auto add = [&](int axis, FaceSide side, uint64_t index) {
       const auto [u, v] = kAlong[static_cast<size_t>(axis)];
@@ -32,9 +32,12 @@ std::vector<GridFace> facesOf(std::span<const GridBlock> blocks, std::span<const
       add(axis, FaceSide::kMin, 0);
       add(axis, FaceSide::kMax, size[static_cast<size_t>(axis)] - 1);
     }
-    for (const IndexPlane& plane : planes)
-      if (plane.block.value_or(block) == block && plane.index < size[static_cast<size_t>(plane.axis)])
-        add(plane.axis, FaceSide::kPlane, plane.index);
+    for (const IndexPlane& plane : planes) {
+      const auto axis = static_cast<size_t>(plane.axis);
+      const uint64_t parts = plane.is_of_parts ? 1 : grid.refinement.ofBlock(block)[axis];
+      if (plane.block.value_or(block) == block && plane.index <= (size[axis] - 1) / parts)
+        add(plane.axis, FaceSide::kPlane, parts * plane.index);
+    }
   }
   return faces;
 }
@@ -67,7 +70,7 @@ class FacesPass {
         job_(job),
         progress_(progress),
         abutting_(grid_.blocks, grid_.coordinate_bytes, sortBytes(), job.temporary),
-        spool_(reader, facesOf(grid_.blocks, job.planes), FaceBox::of(job.lower, job.upper), job.temporary) {}
+        spool_(reader, facesOf(grid_, job.planes), FaceBox::of(job.lower, job.upper), job.temporary) {}
 
   std::optional<FileInfo> write(const SlabBuffers& slabs) {
     spool_.fill(slabs, abutting_, progress_);
@@ -192,18 +195,18 @@ class FacesPass {
 
 }  // namespace
 
-uint64_t temporaryBytesOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes,
+uint64_t temporaryBytesOfFaces(const GridDescription& grid, std::span<const IndexPlane> planes,
                                size_t scalars) {
   uint64_t nodes = 0;
-  for (const GridFace& face : facesOf(blocks, planes)) nodes += face.nodes[0] * face.nodes[1];
-  return nodes * (12 + 4 * scalars) + AbuttingFaces::needsOf(blocks).disk_bytes;
+  for (const GridFace& face : facesOf(grid, planes)) nodes += face.nodes[0] * face.nodes[1];
+  return nodes * (12 + 4 * scalars) + AbuttingFaces::needsOf(grid.blocks).disk_bytes;
 }
 
-uint64_t memoryOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes) {
+uint64_t memoryOfFaces(const GridDescription& grid, std::span<const IndexPlane> planes) {
   // While a face is cut, its patches are in a map, and in two vectors with their places.
   constexpr uint64_t kWhileCut = sizeof(FacePatch) + 2 * (sizeof(FacePatch) + 64);
   uint64_t all = 0, most = 0;
-  for (const GridFace& face : facesOf(blocks, planes)) {
+  for (const GridFace& face : facesOf(grid, planes)) {
     const auto along = [&](size_t axis) { return (face.nodes[axis] - 1 + kPatchQuads - 1) / kPatchQuads; };
     const uint64_t finest = along(0) * along(1);
     const uint64_t patches = finest > 1 ? 2 * finest : 1;  // each level has half as many or fewer
@@ -220,20 +223,21 @@ void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes
     if (plane.block && *plane.block >= grid.blocks.size())
       throw Error("--surface: the grid has no block {}; it has blocks 1 to {}", *plane.block + 1,
                   grid.blocks.size());
-    uint64_t most = 0;
+    uint64_t last = 0;
     for (uint32_t n = 0; n < grid.blocks.size(); ++n)
-      if (plane.block.value_or(n) == n) most = std::max(most, sizeOf(grid.blocks[n])[a]);
-    if (plane.index >= most)
+      if (plane.block.value_or(n) == n)
+        last = std::max(
+            last, (sizeOf(grid.blocks[n])[a] - 1) / (plane.is_of_parts ? 1 : grid.refinement.ofBlock(n)[a]));
+    if (plane.index > last)
       throw Error("--surface: {} {}={}; expected 0 to {}",
                   plane.block ? fmt::format("block {} has no", *plane.block + 1) : "no block has", axis,
-                  plane.index, most - 1);
+                  plane.index, last);
   }
 }
 
 std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job,
                                        const SlabBuffers& slabs, Progress& progress) {
-  const auto& blocks = reader.source().description().blocks;
-  if (facesOf(blocks, job.planes).empty()) return std::nullopt;
+  if (facesOf(reader.source().description(), job.planes).empty()) return std::nullopt;
   return FacesPass(reader, job, progress).write(slabs);
 }
 

@@ -20,11 +20,13 @@
 
 namespace curvisplat {
 
-/// Nodes of one index along an axis, of a block or of all.
+/// Nodes of one index along an axis, of a block or of all. The index is that of the files' grid, whose cells may be cut
+/// (Refinement), or of the cut one.
 struct IndexPlane {
   std::optional<uint32_t> block;
   int axis = 0;
   uint64_t index = 0;
+  bool is_of_parts = false;  // whether the index counts the planes of the cut grid
   bool operator==(const IndexPlane&) const = default;
 };
 
@@ -38,12 +40,12 @@ struct FacesJob {
 };
 
 /// The disk space that the pass takes besides the result.
-uint64_t temporaryBytesOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes,
+uint64_t temporaryBytesOfFaces(const GridDescription& grid, std::span<const IndexPlane> planes,
                                size_t scalars);
 
 /// The most memory that the pass takes besides its slabs: grows with the length of faces, also where they are
 /// narrow.
-uint64_t memoryOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes);
+uint64_t memoryOfFaces(const GridDescription& grid, std::span<const IndexPlane> planes);
 
 /// Throws Error for a plane that is not in the grid: which indices there are.
 void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes);

@@ -31,6 +31,8 @@ constexpr double kMaxDeviation = 1.0;  // of a block that is not cut
 constexpr double kMaxDeviationOfSmall = 0.6;
 constexpr uint64_t kSmallGrid = 100'000;  // nodes
 constexpr uint64_t kLargeGrid = 1'000'000;
+constexpr uint64_t kSampledNodes =
+    2'000'000;  // of large grids, so that it takes a few percent of a conversion
 
 /// The axes of a pair, in the order of BlockBends::squares.
 std::array<size_t, 2> axesOf(size_t pair) {
@@ -140,6 +142,17 @@ uint64_t nodesOf(const std::vector<GridBlock>& blocks) {
   uint64_t nodes = 0;
   for (const GridBlock& block : blocks) nodes += block.nodes();
   return nodes;
+}
+
+/// One in so many slabs of each block, evenly, and at least one.
+std::vector<Slab> sampleOf(const std::vector<Slab>& slabs, uint64_t one_in) {
+  std::vector<Slab> sample;
+  for (size_t begin = 0, end = 0; begin < slabs.size(); begin = end) {
+    while (end < slabs.size() && slabs[end].block == slabs[begin].block) ++end;
+    const size_t of_block = end - begin, count = (of_block + one_in - 1) / one_in;
+    for (size_t n = 0; n < count; ++n) sample.push_back(slabs[begin + (2 * n + 1) * of_block / (2 * count)]);
+  }
+  return sample;
 }
 
 double deviationOf(const std::vector<BlockBends>& bends) {
@@ -281,15 +294,10 @@ double BlockBends::deviation(const CellCuts& cuts) const {
 std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes) {
   const std::vector<GridBlock>& blocks = source.description().blocks;
   std::vector<BlockBends> bends(blocks.size());
-  std::vector<Slab> slabs = cutIntoSlabs(blocks, kWindowNodes, kNodeHalo);
-  const uint64_t stride = (nodesOf(blocks) + nodes - 1) / nodes;
-  if (stride > 1) {
-    size_t kept = 0;
-    for (size_t n = 0; n < slabs.size(); n += stride) slabs[kept++] = slabs[n];
-    slabs.resize(kept);
-  }
+  const uint64_t one_in = std::max<uint64_t>((nodesOf(blocks) + nodes - 1) / nodes, 1);
   const NodeReader reader(source, {}, std::nullopt);
-  SlabStream stream(reader, kWindowNodes * slabBytesPerNode(0), std::move(slabs));
+  SlabStream stream(reader, kWindowNodes * slabBytesPerNode(0),
+                    sampleOf(cutIntoSlabs(blocks, kWindowNodes, kNodeHalo), one_in));
   while (const LoadedSlab* loaded = stream.next()) {
     BlockBends& of_block = bends[loaded->slab.block];
     of_block = sum(of_block, sumOf(blocks[loaded->slab.block], *loaded));
@@ -305,7 +313,7 @@ Refinement refinementByNeed(const GridSource& source) {
   const std::vector<GridBlock>& blocks = source.description().blocks;
   const uint64_t nodes = nodesOf(blocks);
   if (nodes > kMaxCutByNeed) return {};
-  const std::vector<BlockBends> bends = measureBends(source, kMaxCutByNeed);
+  const std::vector<BlockBends> bends = measureBends(source, kSampledNodes);
   const bool small = nodes <= kSmallGrid && deviationOf(bends) > kMaxDeviationOfSmall;
   const double max = small ? kMaxDeviationOfSmall : kMaxDeviation;
   const bool shows =
@@ -316,7 +324,6 @@ Refinement refinementByNeed(const GridSource& source) {
 }
 
 std::string noteOnCells(const GridSource& source) {
-  constexpr uint64_t kSampledNodes = 1'000'000;
   constexpr double kMinShare = 0.05;  // of the volume
   const std::vector<GridBlock>& blocks = source.description().blocks;
   if (nodesOf(blocks) > kMaxCutByNeed) return {};

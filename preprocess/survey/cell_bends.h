@@ -37,7 +37,7 @@ struct BlockBends {
   double deviation(const CellCuts& cuts = kWholeCells) const;
 };
 
-/// Measures the blocks of a grid: all nodes if it has at most `nodes`, or else some slabs of them. What is
+/// Measures the blocks of a grid: all nodes if it has at most `nodes`, or else some slabs of each block. What is
 /// found depends neither on threads nor on memory. Takes 40 MB. Throws Error if the grid cannot be read.
 std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes);
 

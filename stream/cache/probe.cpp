@@ -1,9 +1,11 @@
 #include "stream/cache/probe.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
+#include "stream/base/error.h"
 #include "stream/model/kernel.h"
 
 namespace curvisplat {
@@ -31,10 +33,20 @@ struct Probed {
   std::vector<double> values;  // [variable]: sums by weight
 };
 
-NodeRun nodeOf(std::span<const NodeRun> runs, uint32_t splat) {
+/// The sample of a splat, as the files' grid has it.
+ReachingSample sampleOf(const CacheReader& reader, std::span<const NodeRun> runs, uint32_t splat) {
+  const Manifest& manifest = reader.manifest();
   uint64_t first = 0;
   for (const NodeRun& run : runs) {
-    if (splat < first + run.count) return {run.block, run.i + (splat - first), run.j, run.k, 1};
+    if (splat < first + run.count) {
+      if (run.block >= manifest.blocks.size())
+        throw Error("{}: is damaged: a brick has nodes of block {}, and there are {}", reader.path().string(),
+                    run.block + 1, manifest.blocks.size());
+      const std::array<uint64_t, 3> index{run.i + (splat - first), run.j, run.k};
+      const auto [i, j, k] = manifest.cells ? manifest.refinement.cellInFiles(run.block, index)
+                                            : manifest.refinement.nodeInFiles(run.block, index);
+      return {run.block, i, j, k};
+    }
     first += run.count;
   }
   return {};
@@ -48,24 +60,25 @@ struct Leaf {
   std::vector<SplatVariable> variables;
 };
 
-void addSplat(const Leaf& leaf, uint32_t s, const glm::dvec3& centre, const glm::dvec3& point,
-              Probed& probed) {
+void addSplat(const CacheReader& reader, const Leaf& leaf, uint32_t s, const glm::dvec3& centre,
+              const glm::dvec3& point, Probed& probed) {
   const glm::dvec3 offset = inFootprint(leaf.geometry, s, point - centre);
   const double distance = glm::length(offset);
   if (!(distance < kKernelSupport)) return;
   const double inside = 1 - distance * distance / (kKernelSupport * kKernelSupport), weight = inside * inside;
   const bool is_nearest = !probed.nearest || distance < probed.nearest->distance;
-  const NodeRun node = nodeOf(leaf.runs, s);
-  const ReachingSample sample{node.block, node.i, node.j, node.k, distance};
-  const auto of_block = std::find_if(probed.near.begin(), probed.near.end(),
-                                     [&](const ReachingSample& other) { return other.block == node.block; });
+  ReachingSample sample = sampleOf(reader, leaf.runs, s);
+  sample.distance = distance;
+  const auto of_block =
+      std::find_if(probed.near.begin(), probed.near.end(),
+                   [&](const ReachingSample& other) { return other.block == sample.block; });
   if (of_block == probed.near.end())
     probed.near.push_back(sample);
   else if (distance < of_block->distance)
     *of_block = sample;
   if (is_nearest) {
     probed.nearest =
-        ProbeResult{leaf.number, s, node.block, node.i, node.j, node.k, centre, distance, {}, {}};
+        ProbeResult{leaf.number, s, sample.block, sample.i, sample.j, sample.k, centre, distance, {}, {}};
     probed.nearest->variables.resize(leaf.variables.size());
   }
   probed.weights += weight;
@@ -105,7 +118,7 @@ std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader, std:
       auto at = std::lower_bound(near.begin(), near.end(), centre.x - reach,
                                  [&](size_t p, double x) { return points[p].x < x; });
       for (; at != near.end() && points[*at].x <= centre.x + reach; ++at)
-        addSplat(leaf, s, centre, points[*at], probed[*at]);
+        addSplat(reader, leaf, s, centre, points[*at], probed[*at]);
     }
   }
   std::vector<std::optional<ProbeResult>> results;

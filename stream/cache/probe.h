@@ -18,7 +18,8 @@ struct ProbeVariable {
       0;  // at the point: what the splats that reach it say by their means and slopes, the nearer the more
 };
 
-/// A sample of a block whose splat reaches a point.
+/// A sample of a block whose splat reaches a point, by its indices in the files' grid: where a cache was made of cut
+/// cells (Refinement), the nearest node, or the cell that was cut.
 struct ReachingSample {
   uint32_t block = 0;
   uint64_t i = 0, j = 0, k = 0;
@@ -29,7 +30,7 @@ struct ReachingSample {
 struct ProbeResult {
   uint32_t brick = 0;  // index in reader.bricks(); a leaf
   uint32_t splat = 0;
-  uint32_t block = 0;  // of the node or cell; block, i, j and k count from 0
+  uint32_t block = 0;  // of the node or cell, as in ReachingSample; block, i, j and k count from 0
   uint64_t i = 0, j = 0, k = 0;
   glm::dvec3 centre{0.0};  // of the splat: the middle of the sample's cell, world units
   double distance = 0;     // |A⁻¹(x - μ)|: 0 at the splat's centre, 1.556 at the edge of its support

@@ -48,6 +48,19 @@ class Refinement {
   const std::vector<CellCuts>& ofBlocks() const { return of_blocks_; }
   const CellCuts& ofBlock(size_t block) const { return isUniform() ? of_all_ : of_blocks_.at(block); }
 
+  /// The node of the files' grid that is nearest to `node` of the cut one, by its indices along i, j and k.
+  std::array<uint64_t, 3> nodeInFiles(size_t block, std::array<uint64_t, 3> node) const {
+    const CellCuts& parts = ofBlock(block);
+    for (size_t axis = 0; axis < 3; ++axis) node[axis] = (node[axis] + parts[axis] / 2) / parts[axis];
+    return node;
+  }
+  /// The cell of the files' grid that `cell` of the cut one is a part of.
+  std::array<uint64_t, 3> cellInFiles(size_t block, std::array<uint64_t, 3> cell) const {
+    const CellCuts& parts = ofBlock(block);
+    for (size_t axis = 0; axis < 3; ++axis) cell[axis] /= parts[axis];
+    return cell;
+  }
+
   bool operator==(const Refinement&) const = default;
 
  private:

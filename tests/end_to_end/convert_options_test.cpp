@@ -221,7 +221,7 @@ TEST_F(RefineCommand, CutsEachCellAndSaysSo) {
   const ProgramResult info = runProgram({"info", file("2.splats")});
   expectSays(info.out, "2 x 2 x 2");
   const ProgramResult probe = runProgram({"info", file("2.splats"), "--probe", "0.5,0.5,0.5"});
-  expectSays(probe.out, "in the refined grid");
+  expectSays(probe.out, "the middle of the part of a cell there is at");
   EXPECT_EQ(runProgram({"info", file("1.splats")}).out.find("refined"), std::string::npos);
 
   const Files one = filesOf(folder_ / "2.splats");
@@ -284,14 +284,16 @@ TEST_F(RefineCommand, CutsByNeed) {
   const auto convert_ring = [&](const std::string& cache, const Words& more) {
     return runProgram(Words{"convert", file("ring.xyz"), file("ring.fun"), "-o", file(cache)} + more);
   };
-  const ProgramResult whole = convert_ring("1.splats", {});
+  const ProgramResult whole = convert_ring("1.splats", {"--refine", "1"});
   EXPECT_EQ(whole.status, 0);
   expectSays(whole.err, "note: cells differ much from those beside them: a picture will show bands");
   expectSays(whole.err, "--refine auto");
   EXPECT_EQ(manifest("1.splats")["nodes"], 9 * 4 * 5);
 
-  const ProgramResult by_need = convert_ring("auto.splats", {"--refine", "auto", "--threads", "1"});
+  const ProgramResult by_need = convert_ring("auto.splats", {"--threads", "1"});
   EXPECT_EQ(by_need.status, 0);
+  expectSays(by_need.err,
+             "note: cells that bend or grow steeply are cut: 180 nodes of the files become 315; --refine 1");
   EXPECT_EQ(by_need.err.find("cells differ"), std::string::npos);
   const nlohmann::json cut = manifest("auto.splats");
   EXPECT_FALSE(cut.contains("refined"));
@@ -318,12 +320,46 @@ TEST_F(RefineCommand, CutsByNeed) {
   EXPECT_EQ(manifest("even.splats")["blocks"], manifest("1.splats")["blocks"]);
 }
 
+TEST_F(RefineCommand, IndicesAreThoseOfTheFiles) {
+  writeRing(folder_ / "ring");
+  const auto convert_ring = [&](const std::string& cache, const Words& more) {
+    return Words{"convert", file("ring.xyz"), file("ring.fun"), "-o", file(cache), "--scalar", "all,j"} +
+           more;
+  };
+  run(convert_ring("1.splats", {"--refine", "1", "--surface", "j=2"}));
+  run(convert_ring("cut.splats", {"--surface", "j=2"}));
+  EXPECT_EQ(manifest("cut.splats")["blocks"][0]["nj"], 7);
+  // A node of the files, and a point between two of them.
+  const auto nodeAt = [&](const std::string& cache, const std::string& point, const Words& more) {
+    const ProgramResult probe = run(Words{"info", file(cache), "--probe", point, "--json"} + more);
+    const auto json = nlohmann::json::parse(probe.out)["probe"];
+    return std::array<int, 3>{json["i"], json["j"], json["k"]};
+  };
+  for (const Words& more : {Words{}, Words{"--source"}}) {
+    EXPECT_EQ(nodeAt("cut.splats", "5.5,9.52628,2", more), (std::array{3, 2, 2}));
+    EXPECT_EQ(nodeAt("cut.splats", "5.4,9.6,2.1", more), nodeAt("1.splats", "5.4,9.6,2.1", more));
+  }
+  const auto picture = [&](const std::string& cache, const std::string& face) {
+    run({"render", file(cache), "-o", file("p.pfm"), "--size", "64x64", "--volume", "off", "--surface",
+         face});
+    return bytesOfFile(file("p.pfm"));
+  };
+  const std::string of_plane = picture("1.splats", "j=2");
+  EXPECT_TRUE(picture("cut.splats", "j=2") == of_plane) << "the cells of a plane through nodes of the files";
+  EXPECT_TRUE(picture("cut.splats", "j=2:i=1-5") != of_plane);
+  EXPECT_TRUE(picture("cut.splats", "jmax:k=1-9") == picture("1.splats", "jmax:k=1-9"));
+  EXPECT_TRUE(picture("cut.splats", "k=0:j=0-2") != picture("cut.splats", "k=0"));
+  expectRefused({"render", file("cut.splats"), "-o", file("p.pfm"), "--surface", "j=4"}, 1,
+                {"j goes from 0 to 3", "block 1:j=2"});
+  expectRefused(convert_ring("no.splats", {"--surface", "j=4"}), 1, {"expected 0 to 3"});
+}
+
 TEST_F(RefineCommand, AllStepsAreCutByTheNeedOfTheFirst) {
   writeRing(folder_ / "ring");
   for (const char* const step : {"r_0.fun", "r_1.fun", "r_2.fun"})
     std::filesystem::copy_file(folder_ / "ring.fun", folder_ / step);
   const auto series = [&](const std::string& cache, const Words& more) {
-    return Words{"convert", file("ring.xyz"), file("r_*.fun"), "-o", file(cache), "--refine", "auto"} + more;
+    return Words{"convert", file("ring.xyz"), file("r_*.fun"), "-o", file(cache)} + more;
   };
   run(series("all.splats", {}));
   EXPECT_EQ(manifest("all.splats")["blocks"][0]["refined"], (nlohmann::json{1, 2, 1}));

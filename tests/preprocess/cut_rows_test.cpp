@@ -233,7 +233,9 @@ TEST_F(CutRows, OfASourceThatReadsWholeOnesAreRefusedWithASufficientSize) {
 
 TEST_F(CutRows, TakeFacesThatDoNotFitAndAreRefusedWithASufficientSize) {
   constexpr uint64_t kMiB = 1 << 20;
-  const std::vector<GridBlock> long_block{gridBlock(6'000'000, 2, 2)};
+  GridDescription long_block, large;
+  long_block.blocks = {gridBlock(6'000'000, 2, 2)};
+  large.blocks = {gridBlock(4000, 4000, 4000)};
   const auto require = [&](uint64_t mebibytes) {
     MemoryPlan::of(mebibytes * kMiB, 1, 2).requireFaces(memoryOfFaces(long_block, {}));
   };
@@ -248,7 +250,7 @@ TEST_F(CutRows, TakeFacesThatDoNotFitAndAreRefusedWithASufficientSize) {
   const uint64_t least = std::stoull(error.substr(error.find(before) + before.size()));
   EXPECT_NO_THROW(require(least));
   EXPECT_THROW(require(least - 2), Error);
-  EXPECT_LT(memoryOfFaces(std::vector{gridBlock(4000, 4000, 4000)}, {}), 16 * kMiB);
+  EXPECT_LT(memoryOfFaces(large, {}), 16 * kMiB);
 }
 
 }  // namespace

@@ -177,9 +177,10 @@ void runConvert(ConvertArguments arguments) {
   options.differing = DifferingScalars::kKeepApart;
   options.title = arguments.grid.grid.stem().string();
   requireThreads(arguments.threads);
-  const std::string note = ranks.isFirst() ? noteOnCells(*source, arguments.threads) : "";
+  std::vector<std::string> notes;
+  if (ranks.isFirst()) notes = notesOnCells(*source, arguments);
   if (arguments.dry_run) {
-    if (!note.empty()) printMessage("note: {}", note);
+    for (const std::string& note : notes) printMessage("note: {}", note);
     return dryRun(std::move(source), options, arguments);
   }
 
@@ -191,7 +192,7 @@ void runConvert(ConvertArguments arguments) {
   nlohmann::json numbers = statistics(report, progress);
   numbers["ranks"] = ranks.count();
   printWarnings(source->description(), arguments.grid.time_step, report);
-  if (!note.empty()) printMessage("note: {}", note);
+  for (const std::string& note : notes) printMessage("note: {}", note);
   printSummary(arguments, report, secondsOf(progress));
   for (const double largest : printStored(options.output)) numbers["stored_within"].push_back(largest);
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
@@ -308,9 +309,9 @@ void addConvert(CLI::App& app) {
   command->add_option("--blank", arguments->blank_value, "Treat samples with this value as blanked");
   command
       ->add_option("--refine", arguments->refine,
-                   "Cut each cell into N x N x N by its own trilinear map: for grids of few cells that grow "
-                   "or bend steeply from one to the next. auto: only where they do, along the axes that need "
-                   "it, into 2, 4 or 8 parts (default 1: as they are)")
+                   "Cut each cell into N x N x N by its own trilinear map; 1: leave cells as they are. auto: "
+                   "only where cells grow or bend steeply from one to the next, along the axes that need it, "
+                   "into 2, 4 or 8 parts (default: auto)")
       ->type_name("N|auto")
       ->check([](const std::string& text) {
         parseRefinement("--refine", text);

@@ -87,13 +87,14 @@ void printPoint(std::span<const CacheReader> readers, const Probe& probe) {
   const Manifest& manifest = readers.front().manifest();
   const char* const sample = manifest.cells ? "cell" : "node";
   const std::string block = manifest.blocks.size() > 1 ? fmt::format("block {}, ", found->block + 1) : "";
-  const char* const of_refined = manifest.refinement.cutsCells() ? " in the refined grid" : "";
-  const char* const where = !probe.of_source ? ", the middle of whose cell is"
-                            : manifest.cells ? ", whose middle is"
-                                             : ",";
-  fmt::print("{}: {} {} {}i {}, j {}, k {} (counted from 0){}{} at {:.6g}, {:.6g}, {:.6g}\n", point,
+  const char* const where = !probe.of_source && manifest.refinement.cutsCells()
+                                ? "; the middle of the part of a cell there is"
+                            : !probe.of_source ? ", the middle of whose cell is"
+                            : manifest.cells   ? ", whose middle is"
+                                               : ",";
+  fmt::print("{}: {} {} {}i {}, j {}, k {} (counted from 0){} at {:.6g}, {:.6g}, {:.6g}\n", point,
              probe.of_source && manifest.cells ? "in" : "nearest", sample, block, found->i, found->j,
-             found->k, of_refined, where, found->place.x, found->place.y, found->place.z);
+             found->k, where, found->place.x, found->place.y, found->place.z);
   const std::vector<VariableInfo> variables = variablesOf(readers);
   const int digits = probe.of_source ? 9 : 6;
   for (size_t v = 0; v < variables.size(); ++v) {

@@ -231,16 +231,14 @@ unsigned threadsFor(unsigned given) {
 class RefinementOnce {
  public:
   template <typename Find>
-  std::optional<Refinement> get(const Find& find) {
+  const Refinement& get(const Find& find) {
     const std::scoped_lock lock(mutex_);
-    if (!is_found_) found_ = find();
-    is_found_ = true;
-    return found_;
+    if (!found_) found_ = find();
+    return *found_;
   }
 
  private:
   std::mutex mutex_;
-  bool is_found_ = false;            // guarded by mutex_
   std::optional<Refinement> found_;  // guarded by mutex_
 };
 
@@ -275,7 +273,7 @@ std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments,
   std::unique_ptr<DataSource> source = openWithDerived(grid, {arguments.gas, arguments.blank_value});
   if (const auto refinement = refinementOf(arguments, cache))
     return refinedBy(*refinement, std::move(source), arguments.blank_value);
-  const auto parts = parseRefinement("--refine", arguments.refine.value_or("1"));
+  const auto parts = parseRefinement("--refine", arguments.refine.value_or(kByNeed));
   const Refinement refinement = parts ? Refinement(*parts) : refinementByNeed(*source, arguments.threads);
   return refinedBy(refinement, std::move(source), arguments.blank_value);
 }
@@ -299,10 +297,28 @@ Refinement refinementByNeed(const DataSource& source, unsigned threads) {
   return grid ? refinementByNeed(*grid) : Refinement();
 }
 
-std::string noteOnCells(const DataSource& source, unsigned threads) {
-  const ConversionThreads bound(threadsFor(threads));
+std::vector<std::string> notesOnCells(const DataSource& source, const ConvertArguments& arguments) {
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
-  return grid ? noteOnCells(*grid) : std::string();
+  if (!grid) return {};
+  std::vector<std::string> notes;
+  const GridDescription& description = grid->description();
+  if (description.refinement.cutsCells() && !arguments.refine) {
+    uint64_t nodes = 0, in_files = 0;
+    for (size_t n = 0; n < description.blocks.size(); ++n) {
+      const GridBlock& block = description.blocks[n];
+      const auto [i, j, k] =
+          description.refinement.nodeInFiles(n, {block.ni - 1, block.nj - 1, block.nk - 1});
+      nodes += block.nodes();
+      in_files += (i + 1) * (j + 1) * (k + 1);
+    }
+    notes.push_back(
+        fmt::format("cells that bend or grow steeply are cut: {} nodes of the files become {}; --refine 1 "
+                    "leaves them whole",
+                    in_files, nodes));
+  }
+  const ConversionThreads bound(threadsFor(arguments.threads));
+  if (std::string note = noteOnCells(*grid); !note.empty()) notes.push_back(std::move(note));
+  return notes;
 }
 
 std::optional<uint32_t> parseRefinement(const std::string& option, const std::string& text) {
@@ -419,12 +435,11 @@ std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std:
   return chosen;
 }
 
-std::optional<Refinement> refinementOfSteps(const ConvertArguments& arguments,
-                                            const std::filesystem::path& cache,
-                                            const std::vector<StepFiles>& steps) {
-  if (const auto of_cache = refinementOf(arguments, cache)) return of_cache;
-  if (!arguments.refine) return {};
-  if (const auto parts = parseRefinement("--refine", *arguments.refine)) return Refinement(*parts);
+Refinement refinementOfSteps(const ConvertArguments& arguments, const std::filesystem::path& cache,
+                             const std::vector<StepFiles>& steps) {
+  if (const auto of_cache = refinementOf(arguments, cache)) return *of_cache;
+  if (const auto parts = parseRefinement("--refine", arguments.refine.value_or(kByNeed)))
+    return Refinement(*parts);
   std::exception_ptr failure;
   for (const StepFiles& step : steps) try {
       ConvertArguments of_step = arguments;

@@ -58,7 +58,7 @@ struct ConvertArguments {
   std::vector<std::string> scalars, added_scalars;
   std::filesystem::path output, to, temporary_folder, statistics, trace;
   std::optional<double> blank_value;
-  std::optional<std::string> refine;     // parts of a cell along each axis, or auto
+  std::optional<std::string> refine;     // parts of a cell along each axis, or auto (the default)
   std::optional<Refinement> refinement;  // instead: as a cache has it
   std::optional<std::string> memory;
   unsigned threads = 0;
@@ -87,8 +87,9 @@ std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_
 /// The refinement by need of a grid (preprocess/survey/cell_bends.h); none of an unstructured one. `threads`: at
 /// most, or 0.
 Refinement refinementByNeed(const DataSource& source, unsigned threads);
-/// The note on a grid whose cells a picture will show; empty for others and for unstructured ones.
-std::string noteOnCells(const DataSource& source, unsigned threads);
+/// Notes on a structured grid's cells, a line each: that they are cut without having been asked for, and that a
+/// picture will show them. `threads`: as above.
+std::vector<std::string> notesOnCells(const DataSource& source, const ConvertArguments& arguments);
 
 /// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names it
 /// chooses all that the files store, at most 16 of one centring, and a note says what is left out. Prints a
@@ -149,10 +150,9 @@ nlohmann::json commonStatistics(const Report& report, const Progress& progress) 
 std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std::string& option = "--steps");
 
 /// The refinement of all `steps` of a series: that of `cache` if it is continued, or as --refine asks, by need of
-/// the first step that can be opened. nullopt without the option. Throws UsageError and Error.
-std::optional<Refinement> refinementOfSteps(const ConvertArguments& arguments,
-                                            const std::filesystem::path& cache,
-                                            const std::vector<StepFiles>& steps);
+/// the first step that can be opened. Throws UsageError and Error.
+Refinement refinementOfSteps(const ConvertArguments& arguments, const std::filesystem::path& cache,
+                             const std::vector<StepFiles>& steps);
 
 /// A series for convertSeries(): opens each step as `arguments` say, and chooses the scalars from the first.
 /// `arguments` and `steps` must outlive the result.

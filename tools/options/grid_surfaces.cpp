@@ -87,9 +87,17 @@ std::string listed(const std::vector<std::string>& names) {
                      count < names.size() ? fmt::format(" and {} more", names.size() - count) : "");
 }
 
-std::string nameOf(const GridFace& face) {
+/// The parts that cells of the files' grid, whose indices names have, are cut into.
+uint64_t partsOf(const Manifest& manifest, size_t block, int axis) {
+  return block < manifest.blocks.size() ? manifest.refinement.ofBlock(block)[static_cast<size_t>(axis)] : 1;
+}
+
+std::string nameOf(const GridFace& face, const Manifest& manifest) {
   const char axis = "ijk"[face.axis];
-  if (face.side == FaceSide::kPlane) return fmt::format("block {}:{}={}", face.block + 1, axis, face.index);
+  if (face.side == FaceSide::kPlane)
+    return fmt::format(
+        "block {}:{}={}", face.block + 1, axis,
+        static_cast<double>(face.index) / static_cast<double>(partsOf(manifest, face.block, face.axis)));
   return fmt::format("{}{}", axis, face.side == FaceSide::kMin ? "min" : "max");
 }
 
@@ -98,11 +106,11 @@ bool isWall(const FaceRegion& region) {
 }
 
 /// Lists the faces of the cache, for messages.
-std::string whatThereIs(const FacesReader& faces) {
+std::string whatThereIs(const FacesReader& faces, const Manifest& manifest) {
   std::vector<std::string> names;
   std::set<std::string> known;
   for (const GridFace& face : faces.faces())
-    if (const std::string name = nameOf(face); known.insert(name).second) names.push_back(name);
+    if (const std::string name = nameOf(face, manifest); known.insert(name).second) names.push_back(name);
   std::string text = "it has the faces " + listed(names);
   std::vector<std::string> boundaries;
   for (const FaceRegion& region : faces.regions())
@@ -112,8 +120,9 @@ std::string whatThereIs(const FacesReader& faces) {
   return text;
 }
 
-uint64_t lastIndexOf(const BlockInfo& block, int axis) {
-  return (axis == 0 ? block.ni : axis == 1 ? block.nj : block.nk) - 1;
+uint64_t lastIndexOf(const Manifest& manifest, size_t n, int axis) {
+  const BlockInfo& block = manifest.blocks[n];
+  return ((axis == 0 ? block.ni : axis == 1 ? block.nj : block.nk) - 1) / partsOf(manifest, n, axis);
 }
 
 class FaceFinder {
@@ -152,14 +161,21 @@ class FaceFinder {
     if (face.axis != name.axis || name.block.value_or(face.block) != face.block) return false;
     const bool is_plane = face.side == FaceSide::kPlane;
     if (name.at == FaceName::At::kIndex)
-      return face.index == name.index && (is_plane || !has(face, FaceSide::kPlane));
+      return isAt(face, name.index) && (is_plane || !has(face, FaceSide::kPlane));
     const bool is_min = name.at == FaceName::At::kMin;
     const FaceSide side = is_min ? FaceSide::kMin : FaceSide::kMax;
     return is_plane ? face.index == (is_min ? 0 : lastOf(face)) && !has(face, side) : face.side == side;
   }
 
+  bool isAt(const GridFace& face, uint64_t index) const {
+    const uint64_t parts = partsOf(manifest_, face.block, face.axis);
+    return face.index % parts == 0 && face.index / parts == index;
+  }
+
   uint64_t lastOf(const GridFace& face) const {
-    return face.block < manifest_.blocks.size() ? lastIndexOf(manifest_.blocks[face.block], face.axis) : 0;
+    return face.block < manifest_.blocks.size()
+               ? lastIndexOf(manifest_, face.block, face.axis) * partsOf(manifest_, face.block, face.axis)
+               : 0;
   }
 
   void addFace(uint32_t number, const FaceName& name) {
@@ -169,8 +185,9 @@ class FaceFinder {
     for (int axis = 0; axis < 3; ++axis) {
       if (axis == face.axis) continue;
       if (const auto& range = name.ranges[static_cast<size_t>(axis)]) {
-        part.first[along] = range->first;
-        part.last[along] = std::min(range->last, part.last[along]);
+        const uint64_t parts = partsOf(manifest_, face.block, axis);
+        part.first[along] = std::min(range->first, part.last[along]) * parts;
+        part.last[along] = std::min(std::min(range->last, part.last[along]) * parts, part.last[along]);
       }
       if (part.first[along] >= part.last[along]) return;
       ++along;
@@ -208,7 +225,7 @@ Reach reachOf(const FaceName& name, int axis, const Manifest& manifest) {
   Reach reach;
   for (size_t n = 0; n < manifest.blocks.size(); ++n) {
     if (name.block.value_or(n) != n) continue;
-    const uint64_t last = lastIndexOf(manifest.blocks[n], axis);
+    const uint64_t last = lastIndexOf(manifest, n, axis);
     if (last > reach.last) reach = {last, n};
   }
   return reach;
@@ -291,7 +308,8 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
     const auto name = parseFaceName(word);
     const bool is_plane = name && canBeKept(*name, cache.manifest());
     throw Error("{}: --surface {} names no face of the cache and no file{}; {}{}", path,
-                word.empty() ? text : word, meantBy(word, cache.manifest(), *faces), whatThereIs(*faces),
+                word.empty() ? text : word, meantBy(word, cache.manifest(), *faces),
+                whatThereIs(*faces, cache.manifest()),
                 is_plane ? fmt::format("; convert --surface \"{}\" keeps an index plane", word) : "");
   }
   return surface;
@@ -319,7 +337,7 @@ std::vector<std::string> faceNamesOf(const CacheReader& cache) {
   };
   for (const GridFace& face : faces->faces()) {
     const bool is_plane = face.side == FaceSide::kPlane;
-    const std::string name = nameOf(face);
+    const std::string name = nameOf(face, cache.manifest());
     add(is_plane ? of_blocks : names, name);
     if (!is_plane && cache.manifest().blocks.size() > 1)
       add(of_blocks, fmt::format("block {}:{}={}", face.block + 1, name[0], name.substr(1)));

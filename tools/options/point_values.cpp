@@ -27,7 +27,9 @@ void requireSameBlocks(const CacheReader& reader, const GridDescription& descrip
   const auto& blocks = description.blocks;
   bool same = blocks.size() == expected.size();
   for (size_t n = 0; same && n < blocks.size(); ++n)
-    same = blocks[n].ni == expected[n].ni && blocks[n].nj == expected[n].nj && blocks[n].nk == expected[n].nk;
+    same = reader.manifest().refinement.nodeInFiles(
+               n, {expected[n].ni - 1, expected[n].nj - 1, expected[n].nk - 1}) ==
+           std::array{blocks[n].ni - 1, blocks[n].nj - 1, blocks[n].nk - 1};
   if (!same) throw Error("{}: {}", grid.grid.string(), kOtherGrid);
 }
 
@@ -107,8 +109,7 @@ OpenSource openSource(const CacheReader& reader, const PointSource& source) {
     options.scalars.push_back(variable.name);
     opened.ranges.push_back({variable.min, variable.max});
   }
-  opened.grid = refinedBy(reader.manifest().refinement, openWithDerived(options, {source.gas, std::nullopt}),
-                          std::nullopt);
+  opened.grid = openWithDerived(options, {source.gas, std::nullopt});
   const GridDescription& description = opened.grid->description();
   opened.scalars = scalarsLike(reader, description, source.grid);
   if (dynamic_cast<const MeshSource*>(opened.grid.get()))

@@ -169,9 +169,9 @@ py::tuple points(OpenCache& cache, const DataChoice& choice, const py::object& p
   return pointArrays(withScalar(cache, choice.scalar).reader(), choice, progress);
 }
 
-/// A number of parts or "auto"; 1 where it is not given. Throws UsageError.
+/// A number of parts or "auto", the default. Throws UsageError.
 std::string refinementOf(const py::dict& given_options) {
-  if (!given_options.contains("refine")) return "1";
+  if (!given_options.contains("refine")) return "auto";
   const auto text = py::cast<std::string>(given_options["refine"]);
   parseRefinement("refine", text);
   return text;

@@ -41,7 +41,7 @@ def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory
 @_arguments.in_one_line
 def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (), *, scalars: Union[str, Sequence[str]] = (),
             time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False, vertical_scale: float = 1,
-            select: Optional[Mapping[str, float]] = None, blank_value: Optional[float] = None, refine: Union[int, str] = 1, overwrite: bool = False, resume: bool = False,
+            select: Optional[Mapping[str, float]] = None, blank_value: Optional[float] = None, refine: Union[int, str] = "auto", overwrite: bool = False, resume: bool = False,
             memory: Union[str, int, None] = None, threads: int = 0, title: str = "", value_precision: str = "auto",
             progress: Optional[Progress] = None) -> Report:
     """Converts grid files of any kind that `curvisplat convert` reads to the cache `output`, with the same bytes.
@@ -52,8 +52,8 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
 
     scalars: names (default: all that the files store). vertical_scale: the exaggeration of heights on the globe.
     select: which value to read of dimensions of NetCDF that are neither space nor time, such as {"month": 3}.
-    blank_value: samples with this value are not drawn. refine: cut each cell into so many parts along each axis, by its own
-    trilinear map (1 to 16), or "auto": only where cells differ much from those beside them. resume: go on from an interrupted conversion. memory: the limit of this process, in bytes or as
+    blank_value: samples with this value are not drawn. refine: "auto" cuts the cells of structured grids where they differ much
+    from those beside them; a number (1 to 16) cuts each into so many parts along each axis, by its own trilinear map, 1 none. resume: go on from an interrupted conversion. memory: the limit of this process, in bytes or as
     "2G". value_precision: "auto" (as fine as the spread of values needs), "normal" (16 bits for the range of a brick) or "fine" (24). progress: called with (phase, done,
     total, unit).
 
@@ -117,7 +117,7 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
 
 
 @_arguments.in_one_line
-def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, refine: Union[int, str] = 1,
+def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, refine: Union[int, str] = "auto",
                    overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
                    time: Optional[float] = None, value_precision: str = "auto", progress: Optional[Progress] = None) -> Report:
     """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
@@ -156,7 +156,7 @@ def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
 
 @_arguments.in_one_line
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
-                     scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None, refine: Union[int, str] = 1,
+                     scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None, refine: Union[int, str] = "auto",
                      overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
                      value_precision: str = "auto", progress: Optional[Progress] = None) -> Report:
     """Converts a grid larger than memory that `read` hands out piece by piece.
@@ -164,7 +164,7 @@ def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read:
     shapes: (nk, nj, ni) of each block. scalars: names, or units by name. read(block, k0, k1, j0, j1, names) returns (x, y, z, [values of
     each name], blank): arrays of shape (k1 - k0, j1 - j0, ni); blank is None or of bool. If `read` has parameters i0 and i1, it is
     called with them, too, and returns arrays of i1 - i0 elements along i: then rows may be longer than what fits in `memory`. It is
-    called three times for each piece, in any thread, one call at a time. refine: as in convert(). Raises as convert() does,
+    called three times for each piece, and first for its coordinates unless `refine` is a number, in any thread, one call at a time. refine: as in convert(). Raises as convert() does,
     and what `read` raises.
     """
     units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in scalars]
