@@ -80,7 +80,7 @@ class Columns(MeshFormats):
         drawn = []
         for words, scalar in ((paths, name), ([vtu], "c")):
             cache = self.folder / "b.splats"
-            self.run_program("convert", *words, "-o", cache, "--scalar", scalar, "--overwrite")
+            self.run_program("convert", *words, "-o", cache, "--scalar", scalar, "--refine", "1", "--overwrite")
             result = self.run_program("render", cache, "-o", self.folder / "b.pfm", "--size", "64x64", "--range", "0,1")
             self.assertEqual(result.returncode, 0, result.stderr)
             drawn.append(np.frombuffer((self.folder / "b.pfm").read_bytes().split(b"\n", 3)[3], "<f4"))

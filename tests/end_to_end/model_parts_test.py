@@ -173,7 +173,7 @@ class Processors(ModelFileTest):
         names = []
         for time in (0, 1, 2):
             names += self.write(f"out_0000{time}0_restart_{{:04d}}.nc", time=time)
-        done = subprocess.run([PROGRAM, "convert", *(self.folder / name for name in names), "-o", self.folder / "a.splats"],
+        done = subprocess.run([PROGRAM, "convert", *(self.folder / name for name in names), "-o", self.folder / "a.splats", "--refine", "1"],
                               capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         cache = json.loads(subprocess.run([PROGRAM, "info", "--json", self.folder / "a.splats"], capture_output=True, text=True).stdout)

@@ -21,7 +21,7 @@ mount -t tmpfs -o size=200k none "$folder/disk"
 "$program" generate wake --size 32x24x16 --steps 12 -o "$folder/w" > /dev/null
 touch -d '1 hour ago' "$folder"/w*
 cache=$folder/disk/a.splats
-follow=(convert "$folder/w.xyz" "$folder/w_*.fun" --follow --until 12 -o "$cache" --tmp "$folder")
+follow=(convert "$folder/w.xyz" "$folder/w_*.fun" --follow --until 12 --refine 1 -o "$cache" --tmp "$folder")
 
 # Once it is foreseen, once it happens.
 for preflight in '' --no-preflight; do
@@ -42,6 +42,6 @@ done
 
 mount -o remount,size=40m "$folder/disk"
 "$program" "${follow[@]}" --resume > /dev/null
-"$program" convert "$folder/w.xyz" "$folder/w_*.fun" -o "$folder/whole.splats" > /dev/null
+"$program" convert "$folder/w.xyz" "$folder/w_*.fun" --refine 1 -o "$folder/whole.splats" > /dev/null
 diff -r "$cache" "$folder/whole.splats" || fail "the cache differs from one that had space"
 echo "full after $steps steps; then whole"
