@@ -56,20 +56,18 @@ Track slopeAt(const std::vector<KeyFrame>& keys, size_t n) {
          (after * secant(keys[n - 1], keys[n]) + before * secant(keys[n], keys[n + 1]));
 }
 
-glm::dvec3 upBetween(const Camera& a, const Camera& b, double part) {
-  const glm::dvec3 from = glm::normalize(a.view_up), to = glm::normalize(b.view_up);
+}  // namespace
+
+glm::dvec3 directionBetween(const glm::dvec3& from_, const glm::dvec3& to_, const glm::dvec3& around,
+                            double part) {
+  const glm::dvec3 from = glm::normalize(from_), to = glm::normalize(to_);
   const glm::dvec3 across = glm::cross(from, to);
   const double angle = std::atan2(glm::length(across), glm::dot(from, to));
-  if (angle == 0) return a.view_up;
-  glm::dvec3 axis = across;
-  if (glm::length(axis) < 1e-9) {  // opposite directions: roll about the line of sight
-    const glm::dvec3 sight = a.focal_point - a.position;
-    axis = sight - glm::dot(sight, from) * from;
-  }
+  if (angle == 0) return from_;
+  const bool opposite = glm::length(across) < 1e-9;
+  const glm::dvec3 axis = opposite ? around - glm::dot(around, from) * from : across;
   return turned(from, glm::normalize(axis), part * angle);
 }
-
-}  // namespace
 
 Camera orbited(const Camera& camera, double degrees) {
   const double angle = glm::radians(std::remainder(degrees, 360.0));
@@ -167,7 +165,8 @@ Camera CameraPath::at(double time) const {
     camera.parallel_scale = std::exp(track.zoom);
   else
     camera.view_angle_deg = 2 * glm::degrees(std::atan(std::exp(track.zoom)));
-  camera.view_up = upBetween(a.camera, b.camera, s);
+  camera.view_up =
+      directionBetween(a.camera.view_up, b.camera.view_up, a.camera.focal_point - a.camera.position, s);
   return camera;
 }
 
@@ -212,10 +211,14 @@ KeyFrame keyFrame(const JsonField& fields) {
 
 CameraPath CameraPath::fromFile(const std::filesystem::path& path) {
   const JsonDocument document(readTextFile(path), path.string(), "a camera path");
+  return fromJson(document.root(), path.string());
+}
+
+CameraPath CameraPath::fromJson(const JsonField& root, std::string name) {
   std::vector<KeyFrame> key_frames;
-  for (const JsonField& key : document.root().at("key_frames").elements(kMaxKeyFrames))
+  for (const JsonField& key : root.at("key_frames").elements(kMaxKeyFrames))
     key_frames.push_back(keyFrame(key));
-  return CameraPath(std::move(key_frames), path.string());
+  return CameraPath(std::move(key_frames), std::move(name));
 }
 
 }  // namespace curvisplat

@@ -1,12 +1,15 @@
 // Cameras that move: around a point, or along key frames. Pure; any thread.
 #pragma once
 
+#include <glm/vec3.hpp>
+
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "render/camera/camera.h"
+#include "stream/base/json_document.h"
 
 namespace curvisplat {
 
@@ -26,6 +29,11 @@ Camera rolled(const Camera& camera, double degrees);
 /// `camera` with everything `factor` times as large in the picture, as by VTK's Zoom(): the parallel scale,
 /// or the view angle, is divided by it.
 Camera magnified(const Camera& camera, double factor);
+
+/// A direction on the great circle between two, as a unit vector; `from` itself if they are the same. `around`: the axis that
+/// opposite ones turn about, as far as it is across them.
+glm::dvec3 directionBetween(const glm::dvec3& from, const glm::dvec3& to, const glm::dvec3& around,
+                            double part);
 
 /// A camera at one time.
 struct KeyFrame {
@@ -50,9 +58,12 @@ class CameraPath {
   /// Reads the JSON file that tools/REFERENCE.md describes. Throws Error with the file, the key frame and the
   /// field.
   static CameraPath fromFile(const std::filesystem::path& path);
+  /// The same of a file that is parsed already.
+  static CameraPath fromJson(const JsonField& root, std::string name);
 
   double begin() const { return key_frames_.front().time; }
   double end() const { return key_frames_.back().time; }
+  const std::vector<KeyFrame>& keyFrames() const { return key_frames_; }
   /// `time` is clamped to [begin(), end()]. Throws Error if the camera coincides with its focal point then.
   Camera at(double time) const;
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 
@@ -100,6 +101,45 @@ std::string textOf(const std::vector<OpacityPoint>& opacities) {
   for (const OpacityPoint& point : opacities)
     text += fmt::format("{}{}:{}", text.empty() ? "" : ",", point.x, point.opacity);
   return text;
+}
+
+nlohmann::ordered_json jsonOf(const FunctionParts& parts) {
+  nlohmann::ordered_json json = {{"map", parts.map}, {"range", {parts.range.first, parts.range.second}}};
+  if (parts.asinh) json["asinh"] = {parts.asinh->centre, parts.asinh->width};
+  if (!parts.opacities.empty()) json["opacities"] = textOf(parts.opacities);
+  json["opacity_unit"] = parts.opacity_unit;
+  return json;
+}
+
+std::vector<OpacityPoint> opacitiesFrom(const JsonField& field) {
+  try {
+    return parseOpacities("", field.text());
+  } catch (const UsageError&) {
+    field.fail("opacities such as 0:0,0.5:0.8,1:1");
+  }
+}
+
+namespace {
+
+std::pair<double, double> pairFrom(const JsonField& field) {
+  const std::vector<JsonField> both = field.elements(2);
+  if (both.size() != 2) field.fail("two numbers");
+  return {both[0].number(-1e300, 1e300), both[1].number(-1e300, 1e300)};
+}
+
+}  // namespace
+
+FunctionParts functionPartsFrom(const JsonField& fields) {
+  FunctionParts parts{fields.at("map").text(), pairFrom(fields.at("range")), {}, {}, 1};
+  if (!(parts.range.first < parts.range.second)) fields.at("range").fail("an increasing range");
+  if (const auto asinh = fields.find("asinh")) {
+    const auto [centre, width] = pairFrom(*asinh);
+    if (!(width > 0)) asinh->fail("a width above zero");
+    parts.asinh = AsinhScale{centre, width};
+  }
+  if (const auto opacities = fields.find("opacities")) parts.opacities = opacitiesFrom(*opacities);
+  parts.opacity_unit = fields.at("opacity_unit").number(1e-300, 1e300);
+  return parts;
 }
 
 double roundedTo(double value, double scale, int digits) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <glm/vec4.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 
 #include "render/colour/scalar_axis.h"
 #include "render/colour/transfer_function.h"
+#include "stream/base/json_document.h"
 
 namespace curvisplat {
 
@@ -54,6 +56,13 @@ struct FunctionParts {
 std::vector<OpacityPoint> parseOpacities(std::string_view option, std::string_view text);
 /// Writes the text that parseOpacities() reads.
 std::string textOf(const std::vector<OpacityPoint>& opacities);
+
+/// The parts as the JSON of view files and of films has them: map, range, asinh, opacities and opacity_unit.
+nlohmann::ordered_json jsonOf(const FunctionParts& parts);
+/// Reads that. Throws Error with the field; whether the map exists is not checked.
+FunctionParts functionPartsFrom(const JsonField& fields);
+/// The list of parseOpacities(). Throws Error with the field.
+std::vector<OpacityPoint> opacitiesFrom(const JsonField& field);
 
 /// `value` rounded to `digits` decimal digits of `scale` (> 0): 0.1234 for (0.12344, 0.5, 4). The result is
 /// the double nearest to the decimal number, so that it prints with few digits.

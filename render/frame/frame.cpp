@@ -210,6 +210,13 @@ void StepPlayer::setTransferFunction(const TransferFunction& transfer_function) 
   renderer_->setTransferFunction(transfer_function);
 }
 
+void StepPlayer::setFunctions(const DrawnScalars& scalars) {
+  if (!scalars.colour) return setTransferFunction(scalars.opacity.function);
+  scalars_ = scalars;
+  renderer_.reset();  // frees its memory before the next one allocates
+  renderer_ = std::make_unique<FrameRenderer>(cache_, scalars_, backend_);
+}
+
 void StepPlayer::goTo(const StepPosition& position) {
   if (position == cache_.position()) return;
   CacheReader next = cache_.at(position);

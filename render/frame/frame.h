@@ -122,6 +122,8 @@ class StepPlayer {
   FrameRenderer& renderer() { return *renderer_; }
   /// Replaces the function of the opacities, for this step and those to come.
   void setTransferFunction(const TransferFunction& transfer_function);
+  /// Replaces the functions of the same variables. Decoded bricks are kept in a picture of one scalar only.
+  void setFunctions(const DrawnScalars& scalars);
   /// Makes this step, or time between two, the one that is drawn. Throws Error as CacheReader.
   void goTo(const StepPosition& position);
   /// The time that is drawn.

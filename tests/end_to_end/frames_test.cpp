@@ -183,6 +183,56 @@ TEST_F(Frames, APathGoesThroughItsKeyFrames) {
                 {"none.json"});
 }
 
+TEST_F(Frames, AFilmShowsTheFunctionsAndCutsOfItsKeyFrames) {
+  const std::string camera =
+      R"("position": [5, 0, 0.5], "focal_point": [-0.4, 0, 0.5], "view_up": [0, 0, 1], "parallel_scale": 1.5)";
+  std::ofstream(file("film.json")) << fmt::format(
+      R"({{"scalar": "f", "key_frames": [
+    {{"time": 0, {0}, "function": {{"map": "viridis", "range": [0.25, 2], "opacities": "0:0,0.5:0.7,1:0.1",
+      "opacity_unit": 0.5}}, "clip_planes": [[0, 0, 0.5, 0, 0, 1]], "slices": [[0, 0, 0.5, 0, 0, 1]]}},
+    {{"time": 2, {0}, "function": {{"map": "plasma", "range": [0, 1.5], "opacities": "0:0.1,1:0.5",
+      "opacity_unit": 0.25}}, "clip_planes": [[0, 0, 0.25, 0, 0, 1]], "clip_box": [-2, 2, -2, 1, -2, 2]}}]}})",
+      camera);
+  const Words still{"--scalar",      "f",          "--position",   "5,0,0.5",
+                    "--focal-point", "-0.4,0,0.5", "--scalar-bar", "--parallel-scale",
+                    "1.5",           "--opacity"};
+  const Words first{"0:0,0.5:0.7,1:0.1", "--tf", "viridis",      "--range",      "0.25,2",
+                    "--opacity-unit",    "0.5",  "--clip-plane", "0,0,0.5,0,0,1"};
+  const Words last{"0:0.1,1:0.5",    "--tf",           "plasma",        "--range",
+                   "0,1.5",          "--opacity-unit", "0.25",          "--clip-plane",
+                   "0,0,0.25,0,0,1", "--clip-box",     "-2,2,-2,1,-2,2"};
+  run(cached(Words{"-o", file("still_0.png"), "--slice", "0,0,0.5,0,0,1"} + still + first));
+  run(cached(Words{"-o", file("still_2.png")} + still + last));
+  const Words film{"--path", file("film.json"), "--frames", "3", "--scalar-bar"};
+  const ProgramResult drawn = run(cached(Words{"-o", file("film_%d.png")} + film));
+  EXPECT_EQ(drawn.err, "");
+  EXPECT_EQ(drawn.out.find("chosen from the data"), std::string::npos) << drawn.out;
+  EXPECT_EQ(bytes("film_0.png"), bytes("still_0.png"));
+  EXPECT_EQ(bytes("film_2.png"), bytes("still_2.png"));
+  EXPECT_NE(bytes("film_1.png"), bytes("still_0.png"));
+  EXPECT_NE(bytes("film_1.png"), bytes("still_2.png"));
+  // Each frame is the same whatever was drawn before it; also where the film has the colours alone.
+  run(cached(Words{"-o", file("part_%d.png"), "--part", "2/3"} + film));
+  EXPECT_EQ(bytes("film_1.png"), bytes("part_1.png"));
+  const Words opacities{"--opacity-by", "f",         "--opacity-range", "0,1",
+                        "--opacity",    "0:0,1:0.5", "--opacity-unit",  "0.5"};
+  run(cached(Words{"-o", file("two_%d.png")} + film + opacities));
+  run(cached(Words{"-o", file("two_still.png"), "--tf", "plasma", "--range", "0,1.5", "--clip-plane",
+                   "0,0,0.25,0,0,1", "--clip-box", "-2,2,-2,1,-2,2"} +
+             Words(still.begin(), still.end() - 1) + opacities));
+  EXPECT_EQ(bytes("two_2.png"), bytes("two_still.png"));
+
+  for (const auto& [more, word] :
+       {std::pair<Words, const char*>{{"--tf", "grey", "--range", "0,1"}, "--tf and --range"},
+        {{"--clip-plane", "0,0,0,0,0,1"}, "--clip-plane"},
+        {{"--clip-box", "0,1,0,1,0,1"}, "--clip-box"},
+        {{"--slice", "0,0,0,0,0,1"}, "--slice"},
+        {{"--scalar", "g"}, "--scalar"}})
+    expectRefused(cached(Words{"-o", file("no_%d.png")} + film + more), 2,
+                  {"film.json: its key frames have", word});
+  run(cached(Words{"-o", file("alone_%d.png"), "--volume", "off"} + film));  // with the slice of the film
+}
+
 TEST_F(Frames, AFailingFrameIsNamedAndTheOnesBeforeItStay) {
   // Half way the camera passes through its focal point.
   std::ofstream(file("through.json")) << R"({"key_frames": [

@@ -42,6 +42,13 @@ void writeTexts(const Seeds& seeds) {
   seeds.write("camera_path", "perspective", R"({"key_frames": [
  {"time": -1, "position": [1, 2, 3], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "view_angle": 30},
  {"time": 1e3, "position": [-1, 2, -3], "focal_point": [0, 0, 0], "view_up": [1, 2, 3], "view_angle": 170}]})");
+  seeds.write("camera_path", "film", R"({"scalar": "a", "key_frames": [
+ {"time": 0, "position": [1, 2, 3], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "parallel_scale": 2,
+  "function": {"map": "viridis", "range": [0, 2], "opacities": "0:0,0.5:0.7,1:0.1", "opacity_unit": 0.1},
+  "clip_box": [0, 1, 0, 1, 0, 1], "clip_planes": [[0, 0, 0.5, 0, 0, 1]], "slices": [[0.5, 0, 0, 1, 0, 0]]},
+ {"time": 1, "position": [3, 2, 1], "focal_point": [0, 0.5, 0], "view_up": [0, 1, 0], "parallel_scale": 1,
+  "function": {"RGBPoints": [0, 0, 0, 1, 1, 1, 0, 0], "Points": [0, 0, 0.5, 0.5, 1, 1, 0.5, 0], "ColorSpace": "HSV",
+   "ScalarOpacityUnitDistance": 1}, "clip_planes": [[0, 0, 0.5, 0, 0, -1]]}]})");
   for (const char* name : {"q", "function"})
     seeds.write(
         "plot3d_meta", name,

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <limits>
 
-#include "render/camera/camera_path.h"
 #include "render/colour/classification.h"
 #include "render/colour/transfer_function.h"
 #include "render/cpu/cpu_painter.h"
+#include "render/film/film.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "render/mesh/curve_set.h"
@@ -130,11 +130,17 @@ void fuzzTransferFunction(std::span<const std::byte> bytes) {
 
 const RegisteredFuzzTarget transfer_function_target("transfer_function", fuzzTransferFunction);
 
-// Camera paths, and the cameras on them.
+// Camera paths and films: the cameras and functions on them. What is written is read again as the same.
 void fuzzCameraPath(std::span<const std::byte> bytes) {
-  const CameraPath path = CameraPath::fromFile(fuzzFile("path.json", bytes));
+  const Film film = Film::fromFile(fuzzFile("path.json", bytes));
+  const std::string text = film.toJson();
+  CURVISPLAT_CHECK(Film::fromFile(fuzzFile("again.json", std::as_bytes(std::span(text)))).toJson() == text);
+  const CameraPath& path = film.cameras();
   for (int n = -1; n <= 9; ++n) {
-    const Camera camera = path.at(path.begin() + n / 8.0 * (path.end() - path.begin()));
+    const double time = path.begin() + n / 8.0 * (path.end() - path.begin());
+    const Camera camera = path.at(time);
+    if (const auto function = film.lookAt(time).function)
+      checkValues(TransferFunction(*function, nullptr, function->opacity_unit));
     const glm::dmat4 view = camera.viewFromWorld();
     for (int column = 0; column < 4; ++column)
       for (int row = 0; row < 4; ++row) CURVISPLAT_CHECK(std::isfinite(view[column][row]));

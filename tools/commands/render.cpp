@@ -142,7 +142,10 @@ void render(const RenderArguments& given) {
   arguments.annotations.showTitles();
   Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
+  arguments.surfaces.film_has_slices =
+      !arguments.camera.path.empty();  // unless it turns out that it has none
   checkRenderArguments(arguments, options.size);
+  takeFilm(arguments);
   options.threads = threadsOrCores(options.threads);
   const double frames_per_s =
       arguments.frame_rate ? parsePositive("--frame-rate", *arguments.frame_rate) : 25;
@@ -239,8 +242,25 @@ void render(const RenderArguments& given) {
     options.scene =
         same_step ? sceneAtTime(options.scene, cache.time()) : sceneAt(arguments.surfaces, cache, first);
   };
+  const auto show = [&](uint64_t frame) {
+    if (!motion.look) return;
+    const KeyLook look = motion.look(frame);
+    const Film::Stated& has = arguments.camera.film->stated();
+    if (has.clip_boxes) options.clip_box = look.clip_box;
+    if (has.clip_planes) options.clip_planes = *look.clip_planes;
+    if (has.slices) {
+      auto scene = std::make_shared<SurfaceScene>(*options.scene);
+      scene->slices = *look.slices;
+      options.scene = std::move(scene);
+    }
+    if (!arguments.camera.film->functionsChange()) return;
+    DrawnScalars& drawn_now = choice.scalars;  // scalar bars show it
+    (drawn_now.colour ? *drawn_now.colour : drawn_now.opacity).function =
+        TransferFunction(*look.function, nullptr, look.function->opacity_unit);
+    player.setFunctions(drawn_now);
+  };
   try {
-    drawFrames({arguments, manifest, player, output.get(), report, step_changed, box_on_globe}, motion,
+    drawFrames({arguments, manifest, player, output.get(), report, step_changed, show, box_on_globe}, motion,
                numbers, progress);
   } catch (const Interrupted& interrupted) {
     progress.end();
@@ -385,7 +405,7 @@ void addRender(CLI::App& app) {
       ->group(where);
   command
       ->add_option("--path", camera->path,
-                   "Camera path: a JSON file of key frames, described in tools/REFERENCE.md")
+                   "Camera path or film: a JSON file of key frames, described in tools/REFERENCE.md")
       ->group(where);
   command
       ->add_option("--frames", camera->frames,

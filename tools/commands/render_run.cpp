@@ -114,6 +114,36 @@ void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
   if (!arguments.statistics.empty()) checkOutputFile("--stats", arguments.statistics, others);
 }
 
+void takeFilm(RenderArguments& arguments) {
+  const CameraArguments& camera = arguments.camera;
+  if (camera.path.empty()) return;
+  const auto film = std::make_shared<const Film>(Film::fromFile(camera.path));
+  const Film::Stated& has = film->stated();
+  const auto refuse = [&](bool stated, bool given, const char* what, const std::string& options) {
+    if (stated && given)
+      throw UsageError("--path {}: its key frames have {}; leave out {}", camera.path.string(), what,
+                       options);
+  };
+  ScalarArguments& scalar = arguments.scalar;
+  const std::string& name = film->scalar();
+  refuse(!name.empty(), !scalar.scalar.empty() && scalar.scalar != name, "another scalar", "--scalar");
+  if (!name.empty()) scalar.scalar = name;
+  ScalarArguments of_function = scalar;
+  if (!arguments.opacity.by.scalar.empty()) {  // the film has the colours, options the opacities
+    of_function.opacity.reset();
+    of_function.opacity_unit.reset();
+  }
+  const std::string given = givenFunctionOptions(of_function);
+  refuse(has.functions, !given.empty(), "functions", given);
+  refuse(has.clip_boxes, arguments.frame.clip_box.has_value(), "clip boxes", "--clip-box");
+  refuse(has.clip_planes, !arguments.frame.clip_planes.empty(), "clip planes", "--clip-plane");
+  refuse(has.slices, !arguments.surfaces.slices.empty(), "slices", "--slice");
+  scalar.film = film->looks().front().function;
+  arguments.surfaces.film_has_slices = has.slices;
+  checkSurfaceArguments(arguments.surfaces, !arguments.opacity.by.scalar.empty());
+  arguments.camera.film = film;
+}
+
 void requireSameCache(const CacheReader& cache, Ranks& ranks) {
   if (ranks.alone()) return;
   const std::string own = cache.seriesManifest().toJson();
@@ -135,6 +165,7 @@ class FrameRun {
         output_(job.output),
         report_(job.report),
         step_changed_(job.step_changed),
+        show_(job.show),
         box_(job.box),
         progress_(progress),
         ranks_(launchedRanks()),
@@ -220,6 +251,7 @@ class FrameRun {
 
   void draw(uint64_t number, const uint64_t* next, const MotionInTime& motion, Progress& progress) {
     goTo(motion.position(number));
+    show_(number);
     drawn_step_ = position_->step;
     const double time = player_.time();
     const Camera camera = motion.camera(number);
@@ -332,6 +364,7 @@ class FrameRun {
   FrameOutput* output_;  // null at ranks that write nothing
   RenderReport& report_;
   const std::function<void()> step_changed_;
+  const std::function<void(uint64_t)> show_;
   const std::optional<AnnotatedScene::OnGlobe> box_;
   std::optional<StepPosition> position_;  // that the player is at
   uint64_t drawn_step_ = 0;               // of the frame, while the player goes to the next

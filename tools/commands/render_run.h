@@ -53,6 +53,10 @@ std::vector<std::filesystem::path> inputsOf(const RenderArguments& arguments);
 /// an output cannot be written.
 void checkRenderArguments(const RenderArguments& arguments, ImageSize size);
 
+/// Reads the film of --path, if it is given: its scalar, and its first function. Call it after checkRenderArguments(). Throws
+/// UsageError for options that the film states itself, and Error if the file is invalid.
+void takeFilm(RenderArguments& arguments);
+
 /// Throws Error at ranks that have opened another cache than rank 0, or another version of it: each rank
 /// draws a share, which must be of the same data.
 void requireSameCache(const CacheReader& cache, Ranks& ranks);
@@ -65,6 +69,7 @@ struct FrameJob {
   FrameOutput* output;  // null at ranks that write nothing
   RenderReport& report;
   std::function<void()> step_changed;          // called when the player is at another time than before
+  std::function<void(uint64_t frame)> show;    // called before a frame is drawn: takes the look of a film
   std::optional<AnnotatedScene::OnGlobe> box;  // of the axes grid
 };
 

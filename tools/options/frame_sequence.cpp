@@ -13,6 +13,7 @@
 
 #include "preprocess/formats/open/series_files.h"
 #include "render/camera/camera_path.h"
+#include "render/film/film.h"
 #include "stream/base/error.h"
 #include "tools/options/option_parsers.h"
 
@@ -127,15 +128,13 @@ void checkCameraArguments(const CameraArguments& arguments) {
 CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox& box, ImageSize size) {
   const uint64_t frames = arguments.frameCount();
   if (!arguments.path.empty()) {
-    const auto path = std::make_shared<CameraPath>(CameraPath::fromFile(arguments.path));
-    const double step = frames > 1 ? (path->end() - path->begin()) / static_cast<double>(frames - 1) : 0;
-    const auto time = [=](uint64_t frame) {
-      return frame + 1 == frames && frames > 1 ? path->end()
-                                               : path->begin() + step * static_cast<double>(frame);
-    };
-    CameraMotion motion{frames, [=](uint64_t frame) { return path->at(time(frame)); }, {}};
-    if (path->hasSeriesTimes())
-      motion.series_time = [=](uint64_t frame) { return path->seriesTimeAt(time(frame)); };
+    const auto film =
+        arguments.film ? arguments.film : std::make_shared<const Film>(Film::fromFile(arguments.path));
+    const auto time = [=](uint64_t frame) { return film->timeOf(frame, frames); };
+    CameraMotion motion{frames, [=](uint64_t frame) { return film->cameras().at(time(frame)); }, {}};
+    if (film->cameras().hasSeriesTimes())
+      motion.series_time = [=](uint64_t frame) { return film->cameras().seriesTimeAt(time(frame)); };
+    if (film->stated().any()) motion.look = [=](uint64_t frame) { return film->lookAt(time(frame)); };
     return motion;
   }
   Camera first = placedCamera(arguments, box, size);
@@ -237,7 +236,7 @@ MotionInTime inTime(const CameraMotion& motion, const Series& series, const Step
   const auto at = [&series, interpolates = arguments.interpolates](double time) {
     return interpolates ? series.between(time) : StepPosition{series.nearest(time)};
   };
-  MotionInTime timed{motion.frames, motion.camera, {}};
+  MotionInTime timed{motion.frames, motion.camera, {}, motion.look};
   if (motion.series_time) {
     if (arguments.step || arguments.time || arguments.steps)
       throw UsageError(

@@ -15,11 +15,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "render/camera/camera.h"
+#include "render/film/film.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/series.h"
 
@@ -35,6 +37,7 @@ struct CameraArguments {
   std::optional<std::string> azimuth, elevation, roll, zoom;  // on top of the others
   std::optional<uint64_t> frames;
   std::filesystem::path path;
+  std::shared_ptr<const Film> film = nullptr;  // of `path`, where it has been read already
 
   /// Whether they place the camera, rather than change the place that is chosen from the data.
   bool place() const {
@@ -64,6 +67,8 @@ struct CameraMotion {
   std::function<Camera(uint64_t frame)> camera;
   /// The series' time at a frame, if the path's key frames have times; else an empty function.
   std::function<double(uint64_t frame)> series_time;
+  /// The function and cuts of a film at a frame, if it states any; else an empty function.
+  std::function<KeyLook(uint64_t frame)> look = {};
 };
 
 /// The camera of each frame. Requires that checkCameraArguments() accepted the arguments. What they leave
@@ -104,6 +109,7 @@ struct MotionInTime {
   uint64_t frames = 1;
   std::function<Camera(uint64_t frame)> camera;
   std::function<StepPosition(uint64_t frame)> position;
+  std::function<KeyLook(uint64_t frame)> look = {};  // as CameraMotion
 };
 
 /// The arguments with a frame for each of several time steps, if the camera moves and --frames does not say

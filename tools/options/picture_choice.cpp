@@ -187,6 +187,7 @@ std::pair<double, double> PictureChoice::parseRange(const std::string& text) {
 TransferFunction PictureChoice::function(const ScalarArguments& arguments) {
   checkFunctionArguments(arguments);
   if (arguments.scalar.empty() && cache_.manifest().variables.size() > 1) add("--scalar", info().name);
+  if (arguments.film) return TransferFunction(*arguments.film, nullptr, arguments.film->opacity_unit);
   if (isFile(arguments)) return fromFile(arguments);
   if (isAutomatic(arguments)) return automatic(arguments);
   FunctionParts parts;

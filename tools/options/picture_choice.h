@@ -23,6 +23,7 @@ namespace curvisplat {
 struct ScalarArguments {
   std::string scalar;
   std::optional<std::string> transfer_function, range, opacity, asinh, opacity_unit;
+  std::optional<TransferFunctionDefinition> film = std::nullopt;  // a film's first, in place of these
 };
 
 /// Adds --scalar.

@@ -204,7 +204,7 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
     throw UsageError("--iso-opacity needs an isosurface: --iso VALUE");
   checkCurveArguments(arguments.curves);
   if (arguments.volume == "off" && arguments.surfaces.empty() && arguments.slices.empty() &&
-      arguments.isovalues.empty() && !arguments.curves.given())
+      arguments.isovalues.empty() && !arguments.curves.given() && !arguments.film_has_slices)
     throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface, an --iso or --lines");
 }
 

@@ -37,10 +37,12 @@ struct SurfaceArguments {
   std::vector<std::string> isovalues;
   std::string iso_opacity = "1";
   CurveArguments curves;
+  bool film_has_slices = false;      // --path
   std::optional<std::string> globe;  // on which the cache's grid lies (globe_arguments.h)
 
   bool given() const {
-    return !surfaces.empty() || !slices.empty() || !isovalues.empty() || curves.given() || volume != "on";
+    return !surfaces.empty() || !slices.empty() || !isovalues.empty() || curves.given() || volume != "on" ||
+           film_has_slices;
   }
 };
 

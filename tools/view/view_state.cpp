@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "render/automatic/first_choice.h"
+#include "render/colour/function_parts.h"
 #include "render/mesh/triangle_mesh.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
@@ -79,38 +80,7 @@ Camera cameraFrom(const JsonField& fields) {
 Json partsOf(const EditedFunction& function) {
   const auto parts = function.parts();
   if (!parts) return nullptr;
-  Json json = {{"map", parts->map}, {"range", {parts->range.first, parts->range.second}}};
-  if (parts->asinh) json["asinh"] = {parts->asinh->centre, parts->asinh->width};
-  if (!parts->opacities.empty()) json["opacities"] = textOf(parts->opacities);
-  json["opacity_unit"] = parts->opacity_unit;
-  return json;
-}
-
-std::pair<double, double> pairFrom(const JsonField& field) {
-  const std::vector<JsonField> both = field.elements(2);
-  if (both.size() != 2) field.fail("two numbers");
-  return {both[0].number(-1e300, 1e300), both[1].number(-1e300, 1e300)};
-}
-
-std::vector<OpacityPoint> opacitiesFrom(const JsonField& field) {
-  try {
-    return parseOpacities("", field.text());
-  } catch (const UsageError&) {
-    field.fail("opacities such as 0:0,0.5:0.8,1:1");
-  }
-}
-
-FunctionParts partsFrom(const JsonField& fields) {
-  FunctionParts parts{fields.at("map").text(), pairFrom(fields.at("range")), {}, {}, 1};
-  if (!(parts.range.first < parts.range.second)) fields.at("range").fail("an increasing range");
-  if (const auto asinh = fields.find("asinh")) {
-    const auto [centre, width] = pairFrom(*asinh);
-    if (!(width > 0)) asinh->fail("a width above zero");
-    parts.asinh = AsinhScale{centre, width};
-  }
-  if (const auto opacities = fields.find("opacities")) parts.opacities = opacitiesFrom(*opacities);
-  parts.opacity_unit = positive(fields.at("opacity_unit"));
-  return parts;
+  return jsonOf(*parts);
 }
 
 /// The function of `fields`: preset, parts and points. States of earlier versions have no parts.
@@ -119,7 +89,7 @@ EditedFunction functionFrom(const JsonField& fields, const std::filesystem::path
   const bool automatic = preset.text() == EditedFunction::kAutomatic;
   try {
     if (const auto parts = fields.find("parts")) {
-      const FunctionParts read = partsFrom(*parts);
+      const FunctionParts read = functionPartsFrom(*parts);
       EditedFunction function(read);
       if (automatic) function.setAutomatic();
       // The points are what counts: who changes them may not know of the parts.
