@@ -200,9 +200,7 @@ Film Film::fromFile(const std::filesystem::path& path) {
 
 std::string Film::toJson() const {
   const auto point = [](const glm::dvec3& p) { return Json{p.x, p.y, p.z}; };
-  Json json = Json::object();
-  if (!scalar_.empty()) json["scalar"] = scalar_;
-  Json& keys = json["key_frames"] = Json::array();
+  std::vector<std::string> keys;  // each a line, so that people can find and change it
   for (size_t n = 0; n < looks_.size(); ++n) {
     const auto& [time, camera, series_time] = cameras_.keyFrames()[n];
     const KeyLook& look = looks_[n];
@@ -222,9 +220,10 @@ std::string Film::toJson() const {
     }
     if (look.clip_planes) key["clip_planes"] = jsonOf(*look.clip_planes);
     if (look.slices) key["slices"] = jsonOf(*look.slices);
-    keys.push_back(std::move(key));
+    keys.push_back(key.dump());
   }
-  return json.dump(1) + "\n";
+  const std::string scalar = scalar_.empty() ? "" : fmt::format("\"scalar\": {}, ", Json(scalar_).dump());
+  return fmt::format("{{{}\"key_frames\": [\n{}]}}\n", scalar, fmt::join(keys, ",\n"));
 }
 
 }  // namespace curvisplat

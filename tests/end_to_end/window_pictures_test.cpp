@@ -220,6 +220,83 @@ TEST_F(WindowMovie, AllTimeStepsAreItsFrames) {
   for (int frame = 0; frame < 4; ++frame) expectSame(frame);
 }
 
+/// Works every control of the film.
+TEST_F(WindowMovie, AFilmIsMadePlayedSavedAndDrawnAsRenderDrawsIt) {
+  open({"--scalar", "volume"}, {900, 700});
+  press("x");
+  choose("Picture", "Add a clip plane");
+  save();
+  tab("View");
+  click("Film");
+  click("add key frame");
+  placeOf("key frame 1 drawn");
+  EXPECT_FALSE(hasWidget("key frame 2"));
+  press("y");
+  tab("Colour");
+  addPoint();
+  save();
+  tab("View");
+  click("add key frame");
+  click("add key frame");
+  placeOf("key frame 3 drawn");
+  EXPECT_TRUE(hasWidget("film length of 4 s, 101 pictures"));
+  click("delete key frame");
+  EXPECT_TRUE(eventually([] { return !hasWidget("key frame 3"); }));
+  // By a number, and by the mouse.
+  click("film time");
+  press("ctrl+a");
+  act({"type", "0.4"});
+  press("Return");
+  placeOf("film length of 0.4 s, 11 pictures");
+  drag(1, placeOf("mark of key frame 2"), placeOf("film time line", 0.9));
+  EXPECT_TRUE(eventually([] { return !hasWidget("film length of 0.4 s"); }));
+  click("film time");
+  press("ctrl+a");
+  act({"type", "0.2"});
+  press("Return");
+  placeOf("film length of 0.2 s, 6 pictures");
+  // Selecting shows what the key frame shows; the view that is updated is another one.
+  const Image last = save();
+  click("key frame 1");
+  const Image first = save();
+  EXPECT_LT(difference(first, last), 40);
+  click("play film");
+  click("key frame 2");
+  EXPECT_GE(difference(save(), last), 50);
+  press("z");
+  const Image other = save();
+  click("update key frame");
+  placeOf("key frame 2 drawn");
+  click("film time line");  // somewhere within the film, or at its end
+  click("key frame 2");
+  EXPECT_GE(difference(save(), other), 50);
+
+  click("save film");
+  answer("movie/film.json");
+  EXPECT_TRUE(eventually([] { return fs::exists("movie/film.json"); }));
+  click("delete key frame");
+  click("delete key frame");
+  EXPECT_TRUE(eventually([] { return !hasWidget("key frame 1"); }));
+  click("open film");
+  answer("movie/film.json");
+  placeOf("key frame 2 drawn");
+  EXPECT_GE(difference(save(), first), 50);
+
+  click("Save movie: film...");
+  answer("movie/m.png");
+  const auto is_written = [] { return fs::exists("movie/m_0005.png") && !hasWidget("stop movie"); };
+  EXPECT_TRUE(eventually(is_written, 300));
+  click("Copy command for the film");
+  save();
+  const auto command = close().at(0);
+  EXPECT_EQ(filesIn("movie"), 7u);  // with the film
+  EXPECT_EQ(valueOf(command, "--path"), "a_film.json");
+  EXPECT_EQ(bytesOfFile("a_film.json"), bytesOfFile("movie/film.json"));
+  draw(command, {});
+  for (const int frame : {0, 3, 5}) expectSame(frame);
+  EXPECT_LT(difference(readImage("movie/m_0000.png"), readImage("movie/m_0003.png")), 40);
+}
+
 TEST_F(WindowMovie, OneThatIsStoppedLeavesNothing) {
   if (!fs::exists("/usr/bin/ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
   open();

@@ -7,12 +7,21 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stream/cache/series.h"
 #include "tools/window/window_commands.h"
 
 namespace curvisplat {
+
+/// The user's actions with the film: key frames by number, times in seconds.
+struct FilmActions {
+  bool add = false, replace = false, remove = false, play = false, open = false, save = false;
+  std::optional<size_t> select;
+  std::optional<double> go_to;
+  std::optional<std::pair<size_t, double>> move;
+};
 
 /// The user's actions in the panels and menus during a frame.
 struct PanelActions {
@@ -30,7 +39,8 @@ struct PanelActions {
   std::optional<std::string> load_view, save_view, remove_view;  // by name
   bool looks_for_scalars = false;         // for what the sources have and the cache lacks
   std::optional<std::string> add_scalar;  // of those
-  std::string error;                      // of what the user asked for
+  FilmActions film;
+  std::string error;  // of what the user asked for
 
   void run(Command command) { commands.push_back(command); }
 };

@@ -287,6 +287,8 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   heading("Saved views");
   drawSavedViews(actions, facts.views);
   ImGui::Spacing();
+  if (const Section open{"Film", keys_seen_, facts.film->keys().size()})
+    film_.draw(*facts.film, facts.film_pictures, actions);
   if (const Section open{"Detail and memory", false}) drawDetail(state, actions);
   if (const Section open{"Statistics", false}) drawStatistics(state, facts.shown);
 }

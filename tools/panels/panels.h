@@ -11,6 +11,7 @@
 
 #include "render/frame/frame_statistics.h"
 #include "stream/cache/cache_reader.h"
+#include "tools/panels/film_panel.h"
 #include "tools/panels/function_panel.h"
 #include "tools/panels/labels.h"
 #include "tools/panels/scene_panels.h"
@@ -41,6 +42,8 @@ struct PanelFacts {
   Playback* playback = nullptr;    // of a series; the panels set its speed and loop
   std::vector<std::string> views;  // saved ones, by name
   Rectangle place;                 // of the panels in the window
+  const FilmEdit* film = nullptr;
+  FilmPictures film_pictures;
   const FurtherScalars* further = nullptr;
   const std::vector<std::string>* faces = nullptr;      // that can be added as surfaces
   const std::vector<std::string>* elsewhere = nullptr;  // scalars that have values at other samples
@@ -56,6 +59,8 @@ class Panels {
 
   /// Draws the panels into the current Dear ImGui frame and applies edits to `state`.
   PanelActions draw(ViewState& state, const PanelFacts& facts);
+  /// The film has changed the lists of objects: that brings up no tab.
+  void forgetObjects() { objects_seen_.reset(); }
 
  private:
   bool hasMoreObjects(const ViewState& state);
@@ -73,7 +78,8 @@ class Panels {
   SurfacePanel surfaces_;
   FunctionPanel function_, opacity_function_;
   std::string view_name_;
-  std::optional<size_t> objects_seen_;  // in the frame before
+  FilmPanel film_;
+  std::optional<size_t> objects_seen_, keys_seen_;  // in the frame before
 };
 
 }  // namespace curvisplat

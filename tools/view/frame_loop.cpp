@@ -22,6 +22,8 @@ uint64_t coarsestSplats(const CacheReader& cache) {
   return splats;
 }
 
+}  // namespace
+
 std::vector<uint8_t> bytesOf(const Image& image) {
   std::vector<uint8_t> bytes(image.rgba.size());
   std::transform(image.rgba.begin(), image.rgba.end(), bytes.begin(), [](float channel) {
@@ -29,8 +31,6 @@ std::vector<uint8_t> bytesOf(const Image& image) {
   });
   return bytes;
 }
-
-}  // namespace
 
 // Adapts the effort. A picture that was too slow reduces splats as long as that helps, then the resolution;
 // one that was fast raises them in reverse order.

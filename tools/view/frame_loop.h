@@ -77,6 +77,9 @@ struct FrameRequest {
   FacesAtStep faces_at = {};              // needed where there are faces
 };
 
+/// A picture as 8-bit RGBA, clamped: ShownFrame::bytes.
+std::vector<uint8_t> bytesOf(const Image& image);
+
 /// A picture for the window.
 struct ShownFrame {
   Image image;

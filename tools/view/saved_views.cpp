@@ -186,8 +186,10 @@ void addOpacities(const EditedFunction& function, CommandLine& words) {
 
 /// Adds the functions, in pictures of two scalars the colours of one and the opacities of the other.
 void addFunctions(const ViewState& state, const CommandOptions& options, CommandLine& words) {
-  addFunction(state.function, options.function_file, words);
-  if (!state.opacity_by) return addOpacities(state.function, words);
+  const bool of_film = !options.film.empty();
+  if (!of_film) addFunction(state.function, options.function_file, words);
+  if (!state.opacity_by && !of_film) addOpacities(state.function, words);
+  if (!state.opacity_by) return;
   const auto& [variable, function] = *state.opacity_by;
   words.add("--opacity-by", variable);
   if (const auto parts = function.parts(true)) {
@@ -219,6 +221,17 @@ std::string text(const ClipPlane& plane) {
   return numbers(plane.point, size) + "," + numbers(plane.normal, glm::length(plane.normal));
 }
 
+void addCuts(const ViewState& state, CommandLine& words) {
+  if (state.clip_box) {
+    const auto& [lower, upper] = *state.clip_box;
+    const double size = glm::length(upper - lower);
+    const auto part = [size](double x) { return roundedTo(x, size, kDigits); };
+    words.add("--clip-box", fmt::format("{},{},{},{},{},{}", part(lower.x), part(upper.x), part(lower.y),
+                                        part(upper.y), part(lower.z), part(upper.z)));
+  }
+  for (const ClipPlane& plane : visiblePlanes(state.clip_planes)) words.add("--clip-plane", text(plane));
+}
+
 std::string text(const SheetOpacity& opacity) {
   if (!opacity.by_function) return number(opacity.factor);
   return opacity.factor == 1 ? "function" : "function*" + number(opacity.factor);
@@ -236,8 +249,8 @@ void addSurfaceOpacities(const ViewState& state, CommandLine& words) {
   for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
 }
 
-/// Adds options for surfaces, slices and isosurfaces, except for those that are hidden.
-void addSurfaces(const ViewState& state, CommandLine& words) {
+/// Adds options for surfaces, slices (but for a film's) and isosurfaces, except for those that are hidden.
+void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {
   std::vector<std::string> colours;
   const auto add = [&](const std::string& name, const glm::vec3& colour) {
     const glm::ivec3 rgb(255.0f * colour + 0.5f);
@@ -253,7 +266,8 @@ void addSurfaces(const ViewState& state, CommandLine& words) {
   if (state.faces_by && !state.faceNames().faces.empty()) words.add("--surface-by", state.faces_by->variable);
   const auto scene = state.frameOptions({1, 1}).scene;
   if (!scene) return;
-  for (const ClipPlane& plane : scene->slices) words.add("--slice", text(plane));
+  if (has_slices)
+    for (const ClipPlane& plane : scene->slices) words.add("--slice", text(plane));
   const SheetOpacity of_slices{scene->slice_opacity, scene->slices_by_function};
   if (!of_slices.opaque() && !scene->slices.empty()) words.add("--slice-opacity", text(of_slices));
   if (!scene->isovalues.empty()) {
@@ -282,34 +296,32 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   std::string files = shellWord(options.cache.string());
   for (const std::filesystem::path& file : options.solutions)
     files += fmt::format(" {}", shellWord(file.string()));
-  CommandLine words(
-      fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
+  const bool of_film = !options.film.empty(), is_movie = options.turns || of_film;
+  CommandLine words(fmt::format("curvisplat render {} -o {}", files, is_movie ? "movie.mp4" : "picture.png"));
   if (options.precision != ValuePrecision::kAuto) words.add("--value-precision", wordOf(options.precision));
-  const int multiple = options.turns ? 2 : 1;  // an .mp4 has an even width and height
+  const int multiple = is_movie ? 2 : 1;  // an .mp4 has an even width and height
   words.add("--size", fmt::format("{}x{}", options.size.width / multiple * multiple,
                                   options.size.height / multiple * multiple));
   words.add("--scalar", state.variable);
   addFunctions(state, options, words);
-  addCamera(state.camera, words);
+  if (of_film) {
+    words.add("--path", options.film.string());
+    words.add("--frames", std::to_string(options.film_frames));
+  } else {
+    addCamera(state.camera, words);
+  }
   if (options.turns) words.add("--orbit", "360");
   if (state.lod_pixels != 1) words.add("--lod-pixels", number(state.lod_pixels));
   if (state.classification == Classification::kFlat) words.add("--classify", "flat");
   if (state.scale != glm::dvec3(1.0))
     words.add("--scale", fmt::format("{},{},{}", state.scale.x, state.scale.y, state.scale.z));
-  if (state.clip_box) {
-    const auto& [lower, upper] = *state.clip_box;
-    const double size = glm::length(upper - lower);
-    const auto part = [size](double x) { return roundedTo(x, size, kDigits); };
-    words.add("--clip-box", fmt::format("{},{},{},{},{},{}", part(lower.x), part(upper.x), part(lower.y),
-                                        part(upper.y), part(lower.z), part(upper.z)));
-  }
-  for (const ClipPlane& plane : visiblePlanes(state.clip_planes)) words.add("--clip-plane", text(plane));
+  if (!of_film) addCuts(state, words);
   if (state.lit) words.add("--shade");
   if (state.lit && state.shadow > 0) words.add("--shadow", number(state.shadow));
   if (state.lit && state.ambient_occlusion > 0)
     words.add("--ambient-occlusion", number(state.ambient_occlusion));
   if (!state.gradient_opacity.empty()) words.add("--gradient-opacity", textOf(state.gradient_opacity));
-  addSurfaces(state, words);
+  addSurfaces(state, !of_film, words);
   if (!state.dark) words.add("--background", "white");
   if (state.annotations.scalar_bar) words.add("--scalar-bar");
   if (state.annotations.axes) words.add("--axes");

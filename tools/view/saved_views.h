@@ -5,6 +5,7 @@
 // Files are small and written at once. The functions keep no state: any thread may call them.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -50,6 +51,8 @@ struct CommandOptions {
   ImageSize size;
   std::filesystem::path function_file, opacity_file;  // those that needsFile() asks for
   bool turns = false;                                 // a movie: once around the focal point
+  std::filesystem::path film = {};                    // a movie: this file's, which has what a Film states
+  uint64_t film_frames = 0;
   std::vector<std::filesystem::path> solutions = {};  // where `cache` is a grid: its further files
   ValuePrecision precision = ValuePrecision::kAuto;   // of such a grid: --value-precision
 };

@@ -105,6 +105,7 @@ void CacheView::releasePictures() {
                     hasElsewhere(*wanted_scalar_) ? "shown" : "added"));
   picture_.release();
   overlay_.release();
+  for (auto& [number, picture] : film_pictures_) picture.release();
 }
 
 void CacheView::takePictureOf(CacheView& before) {
@@ -115,11 +116,12 @@ void CacheView::takePictureOf(CacheView& before) {
 
 void CacheView::takeRequestsOf(CacheView& before) {
   save_to_ = std::exchange(before.save_to_, std::nullopt);
-  copy_requested_ = std::exchange(before.copy_requested_, false);
-  copies_movie_ = before.copies_movie_;
+  copy_requested_ = std::exchange(before.copy_requested_, std::nullopt);
   wanted_scalar_ = std::exchange(before.wanted_scalar_, std::nullopt);
   if (hasScalarsOf(manifest(), before.manifest())) chooser_.takeQuestionsOf(before.chooser_);
-  if (before.playback_.steps() == playback_.steps()) playback_ = before.playback_;
+  if (before.playback_.steps() != playback_.steps()) return;
+  playback_ = before.playback_;
+  if (hasScalarsOf(manifest(), before.manifest())) film_ = before.film_;
 }
 
 /// The state that the view before has now, if there is one. Reads only where the user has chosen another
@@ -139,12 +141,13 @@ void CacheView::draw(const WindowLayout& layout) {
   reports_.attempt([&] { takeFrame(); });
   reports_.attempt([&] { takeFunction(); });
   reports_.attempt([&] { takeSurface(); });
+  reports_.attempt([&] { drawFilmPictures(); });
   const ImageSize size = pixelsOf(layout.picture, window_);
   const bool resized = size.width > 0 && !same(size, picture_size_);
   if (resized) fitTo(size);  // before the mouse's movements, which are in its pixels
   react(layout);
   if (size.width > 0) {
-    const bool moving = navigation_.isMoving() || dragging_ || playback_.isPlaying();
+    const bool moving = navigation_.isMoving() || dragging_ || playback_.isPlaying() || film_.isPlaying();
     // A button that is pressed and has not moved anything asks for nothing: a click for a value is answered at once.
     if (changed_ || (was_moving_ && !moving) || resized) {
       fitTo(size);  // bars may have come or gone
@@ -152,8 +155,7 @@ void CacheView::draw(const WindowLayout& layout) {
     }
     showPicture(layout);
     savePictureIfFinal();
-    if (!chooser_.busy() && std::exchange(copy_requested_, false))
-      copyCommand(std::exchange(copies_movie_, false));
+    if (copy_requested_ && !chooser_.busy()) copyCommand(*std::exchange(copy_requested_, std::nullopt));
     probe(layout);
     showPlanesAndMarkers(layout);
     keepHistory();
@@ -193,6 +195,7 @@ void CacheView::giveUpRequest() {
   giveUpSaving();
   clicked_.reset();  // the next picture's pixels may be others
   values_failed_ = true;
+  film_.stop();
   if (!playback_.isPlaying()) return;
   playback_.toggle();
   was_moving_ = false;  // that it rests now is no reason to try again
@@ -241,12 +244,16 @@ void CacheView::annotate() {
 
 /// Applies mouse, panels and playback.
 void CacheView::react(const WindowLayout& layout) {
-  changed_ |= navigation_.update(window_, state_.camera, data_size_);
+  const bool navigated = navigation_.update(window_, state_.camera, data_size_);
+  if (navigated) film_.stop();
+  changed_ |= navigated;
   PanelActions actions;
   if (layout.shows_panels) actions = drawPanels(layout);
   if (isSeries()) drawTimeBar(cache_, playback_, layout.time, actions);
   reports_.attempt([&] { apply(actions); });
   if (isShown()) changed_ |= playback_.tick(clockSeconds());
+  if (isShown() && film_.tick(clockSeconds()))
+    reports_.attempt([&] { showFilm(film_.film()->functionsChange()); });
   dragging_ |= handles_.isDragging();
   setBounds();
 }
@@ -260,6 +267,12 @@ PanelActions CacheView::drawPanels(const WindowLayout& layout) {
   facts.faces = &face_names_;
   facts.elsewhere = &elsewhere_;
   facts.place = layout.panels;
+  facts.film = &film_;
+  facts.film_pictures = [this](uint64_t number) {
+    const auto picture = film_pictures_.find(number);
+    const bool is_there = picture != film_pictures_.end() && !picture->second.isEmpty();
+    return is_there ? picture->second.id() : nullptr;
+  };
   const FurtherScalars further = furtherScalars();
   facts.further = &further;
   return panels_.draw(state_, facts);
@@ -288,6 +301,7 @@ void CacheView::apply(const PanelActions& actions) {
     fs::remove(savedViewOf(whole(), *actions.remove_view), ignored);
     views_ = savedViewsOf(whole());
   }
+  apply(actions.film);
   if (!actions.error.empty()) reports_.report(actions.error);
 }
 
@@ -315,7 +329,7 @@ void CacheView::ask(bool moving) {
 double CacheView::wait() const {
   if (playback_.isPlaying() && isShown() && playback_.wait(clockSeconds()) <= 0) return 0;
   const bool short_wait = navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() ||
-                          probe_.busy() || chooser_.busy() || reading_surface_.valid();
+                          film_.isPlaying() || probe_.busy() || chooser_.busy() || reading_surface_.valid();
   return short_wait ? kMovingWaitSeconds : kIdleWaitSeconds;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <future>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -17,6 +18,7 @@
 #include "tools/panels/panels.h"
 #include "tools/panels/picture_signs.h"
 #include "tools/view/background_jobs.h"
+#include "tools/view/film_edit.h"
 #include "tools/view/first_view.h"
 #include "tools/view/frame_loop.h"
 #include "tools/view/picture_layout.h"
@@ -108,7 +110,7 @@ class CacheView {
   void toggle(bool& value);
   void addPlaneTo(std::vector<ListedPlane>& planes);
   void saveMovieOf(MovieKind kind);
-  void copyLater(bool movie);
+  void copyLater(MovieKind what) { copy_requested_ = what; }
   void moveCamera(Command command);
 
   ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
@@ -125,6 +127,15 @@ class CacheView {
   void colourFaces(const std::string& scalar);
   void saveMovieTo(const std::filesystem::path& file);
   MovieRequest newMovie(const std::filesystem::path& file) const;
+  void apply(const FilmActions& actions);
+  void addKeyFrame(bool replaces);
+  ViewState stateOfFilm() const;
+  void showFilm(bool whole_function);
+  void playFilm();
+  void openFilm(const std::filesystem::path& file);
+  void drawFilmPictures();
+  MovieRequest filmMovie(const std::filesystem::path& file, std::vector<double> times) const;
+  std::optional<double> seriesTime() const;
   void giveUpSaving();
   void giveUpRequest();
   void restartFrames();
@@ -144,8 +155,8 @@ class CacheView {
   void keepHistory();
   void restore(const ViewState* state);
   void savePictureIfFinal();
-  std::string timeOption() const;
-  void copyCommand(bool turns);
+  std::string timeOption(bool of_film) const;
+  void copyCommand(MovieKind what);
   void saveFunction(const std::filesystem::path& file);
   void saveView(const std::string& name);
   void loadView(const std::string& name);
@@ -196,6 +207,11 @@ class CacheView {
   MovieKind movie_kind_ = MovieKind::kOneTurn;  // for which a file is being chosen
   std::optional<MovieRequest> wanted_movie_;
 
+  FilmEdit film_;
+  std::map<uint64_t, PictureTexture> film_pictures_;  // by FilmEdit::Key::picture
+  struct FilmPicturesJob;
+  std::shared_ptr<FilmPicturesJob> film_job_;  // draws those that are missing
+
   bool changed_ = true;  // since the newest request
   uint64_t function_version_ = 1, request_ = 0;
   ImageSize picture_size_{0, 0}, data_size_{0, 0};  // of the newest request
@@ -203,7 +219,7 @@ class CacheView {
   double shown_strip_ = 0;  // part of the picture that the scalar bars take
   bool was_moving_ = false, dragging_ = false, rests_ = false;
   std::optional<std::filesystem::path> save_to_;  // once the picture is final; empty: the next number
-  bool copy_requested_ = false, copies_movie_ = false;
+  std::optional<MovieKind> copy_requested_;       // the command for one of these
 
   std::optional<ShownValues> values_;
   PointProbe probe_;

@@ -14,6 +14,7 @@ constexpr size_t kMaxIsosurfaces = 16;
 std::span<const CommandAction<CacheView>> CacheView::actions() {
   using View = CacheView;
   constexpr auto kHasSteps = [](const View& v) { return v.playback_.steps() > 1; };
+  constexpr auto kHasFilm = [](const View& v) { return v.film_.film() != nullptr; };
   static constexpr CommandAction<View> kActions[] = {
       {Command::kSavePicture, [](View& v) { v.saveTo({}); }},
       {Command::kSavePictureAs,
@@ -22,8 +23,10 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
        }},
       {Command::kSaveTurnMovie, [](View& v) { v.saveMovieOf(MovieKind::kOneTurn); }},
       {Command::kSaveStepsMovie, [](View& v) { v.saveMovieOf(MovieKind::kAllSteps); }, kHasSteps},
-      {Command::kCopyCommand, [](View& v) { v.copyLater(false); }},
-      {Command::kCopyMovieCommand, [](View& v) { v.copyLater(true); }},
+      {Command::kSaveFilmMovie, [](View& v) { v.saveMovieOf(MovieKind::kFilm); }, kHasFilm},
+      {Command::kCopyCommand, [](View& v) { v.copyLater(MovieKind::kOnePicture); }},
+      {Command::kCopyMovieCommand, [](View& v) { v.copyLater(MovieKind::kOneTurn); }},
+      {Command::kCopyFilmCommand, [](View& v) { v.copyLater(MovieKind::kFilm); }, kHasFilm},
       {Command::kUndo,
        [](View& v) {
          v.history_.record(v.state_);  // a movement that has not come to rest is undone as a whole
@@ -79,6 +82,7 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
        [](const View& v) { return !v.state_.markers.empty(); }},
       {Command::kPlay,
        [](View& v) {
+         v.film_.stop();
          v.playback_.toggle();
          v.changed_ = true;
        },
@@ -120,11 +124,6 @@ void CacheView::addPlaneTo(std::vector<ListedPlane>& planes) {
 void CacheView::saveMovieOf(MovieKind kind) {
   movie_kind_ = kind;
   dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", textOf(newMovie({})));
-}
-
-void CacheView::copyLater(bool movie) {
-  copy_requested_ = true;
-  copies_movie_ = movie;
 }
 
 void CacheView::moveCamera(Command command) {

@@ -216,10 +216,11 @@ void CacheView::savePictureIfFinal() {
   }
 }
 
-/// The option that draws the time that is shown; empty of one step.
-std::string CacheView::timeOption() const {
+/// The option that draws the time that is shown, or the times of the film; empty of one step.
+std::string CacheView::timeOption(bool of_film) const {
   const StepPosition at = playback_.position();
   if (playback_.steps() == 1) return {};
+  if (of_film) return playback_.interpolates() ? " --interpolate" : "";
   return at.part == 0 ? fmt::format(" --step {}", at.step)
                       : fmt::format(" --time={} --interpolate", cache_.series().timeAt(at));
 }
@@ -239,6 +240,12 @@ void CacheView::saveMovieTo(const fs::path& file) {
 }
 
 MovieRequest CacheView::newMovie(const fs::path& file) const {
+  if (movie_kind_ == MovieKind::kFilm) {
+    std::vector<double> times;
+    for (uint64_t frame = 0; frame < film_.frames(); ++frame)
+      times.push_back(film_.film()->timeOf(frame, film_.frames()));
+    return filmMovie(file, std::move(times));
+  }
   MovieRequest movie{movie_kind_, file, cache_.at(playback_.position()), state_, picture_size_};
   if (movie_kind_ == MovieKind::kAllSteps) movie.frames_per_s = playback_.stepsPerSecond();
   movie.backend = backend_;
@@ -248,10 +255,14 @@ MovieRequest CacheView::newMovie(const fs::path& file) const {
   return movie;
 }
 
-void CacheView::copyCommand(bool turns) {
+void CacheView::copyCommand(MovieKind what) {
   try {
-    CommandOptions options{
-        shortPath(preview_ ? preview_->whole : cache_.wholePath()), picture_size_, {}, {}, turns};
+    const bool of_film = what == MovieKind::kFilm;
+    CommandOptions options{shortPath(preview_ ? preview_->whole : cache_.wholePath()),
+                           picture_size_,
+                           {},
+                           {},
+                           what == MovieKind::kOneTurn};
     if (!grid_files_.empty() && grid_files_.size() <= kMaxNamedFiles) {
       options.cache = shortPath(grid_files_.front());
       for (size_t n = 1; n < grid_files_.size(); ++n) options.solutions.push_back(shortPath(grid_files_[n]));
@@ -263,15 +274,23 @@ void CacheView::copyCommand(bool turns) {
       file = fmt::format("{}_{}.json", cache_.wholePath().stem().string(), what);
       writeFileDurably(file, toParaViewPreset(function.definition()));
     };
-    keep(state_.function, "colours", options.function_file);
+    if (of_film) {
+      options.film = fmt::format("{}_film.json", cache_.wholePath().stem().string());
+      options.film_frames = film_.frames();
+      writeFileDurably(options.film, film_.film()->toJson());
+    } else {
+      keep(state_.function, "colours", options.function_file);
+    }
     if (state_.opacity_by) keep(state_.opacity_by->function, "opacities", options.opacity_file);
-    const std::string command =
-        renderCommand(state_, options) + timeOption() + (lacks().empty() ? "" : " --keep-going");
+    const std::string command = renderCommand(of_film ? stateOfFilm() : state_, options) +
+                                timeOption(of_film) + (lacks().empty() ? "" : " --keep-going");
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);
-    say(fmt::format("copied the command for {}; paste it into a terminal",
-                    turns ? "a movie" : "this picture"));
+    say(fmt::format("copied the command for {}; paste it into a terminal", of_film ? "the film"
+                                                                           : what == MovieKind::kOneTurn
+                                                                               ? "a movie"
+                                                                               : "this picture"));
   } catch (const Error& error) {
     reports_.report(error);
   }
@@ -299,6 +318,12 @@ void CacheView::use(const FileDialog::Chosen& chosen) {
         return readSurface(file);
       case FileDialog::Purpose::kSaveMovie:
         return saveMovieTo(file);
+      case FileDialog::Purpose::kOpenFilm:
+        return openFilm(file);
+      case FileDialog::Purpose::kSaveFilm:
+        if (!film_.film()) return;
+        writeFileDurably(file, film_.film()->toJson());
+        return say(fmt::format("saved the film to {}", file.string()));
       case FileDialog::Purpose::kOpenData:
         return;
     }

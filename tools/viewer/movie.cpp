@@ -1,6 +1,7 @@
 #include "tools/viewer/movie.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -62,6 +63,8 @@ uint64_t framesOf(const MovieRequest& movie) {
       return kFramesOfTurn;
     case MovieKind::kAllSteps:
       return movie.cache.series().steps.size();
+    case MovieKind::kFilm:
+      return movie.film_times.size();
     case MovieKind::kOnePicture:
       return 1;
   }
@@ -83,44 +86,60 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
   const bool is_picture = movie.kind == MovieKind::kOnePicture;
   const std::filesystem::path file = is_picture ? movie.file : movieNameOf(movie.file);
   const ImageSize size = sizeFor(file, movie.size);
-  const ViewState& state = movie.state;
+  ViewState state = movie.state;
   const StepPosition shown_at = movie.cache.position();
   movie.cache = movie.cache.atStep(shown_at.step);
   const uint64_t frames = framesOf(movie);
-  const ShownFunctions functions(state, movie.cache.manifest());
-  FrameOptions options = state.frameOptions(dataSizeOf(state, movie.cache.manifest(), size));
-  options.keep_going = movie.keep_going;
-  const std::shared_ptr<const SurfaceScene> scene = options.scene;
-  const auto faces_at = [&](uint64_t step) {
-    if (!movie.faces_at || !scene || scene->grid_surfaces.empty()) return;
-    auto found = std::make_shared<SurfaceScene>(*scene);
-    found->grid_surfaces =
-        facesWithLooks(movie.faces_at(movie.cache.atStep(step), state.faceNames()), scene->grid_surfaces);
+  const Film* const film = movie.kind == MovieKind::kFilm ? movie.film.get() : nullptr;
+  if (film) show(*film, movie.film_times.front(), state);
+  std::optional<ShownFunctions> functions(std::in_place, state, movie.cache.manifest());
+  FrameOptions options;
+  uint64_t memory_bytes = state.memory_bytes;  // drawWithEnough() may take more
+  std::optional<uint64_t> faces_of;            // step
+  std::vector<GridSurface> faces;
+  const auto take_options = [&](uint64_t step) {
+    options = state.frameOptions(dataSizeOf(state, movie.cache.manifest(), size));
+    options.memory_bytes = memory_bytes;
+    options.keep_going = movie.keep_going;
+    if (!movie.faces_at || !options.scene || options.scene->grid_surfaces.empty()) return;
+    if (faces_of != step) faces = movie.faces_at(movie.cache.atStep(step), state.faceNames());
+    faces_of = step;
+    auto found = std::make_shared<SurfaceScene>(*options.scene);
+    found->grid_surfaces = facesWithLooks(faces, found->grid_surfaces);
     options.scene = std::move(found);
   };
   const std::unique_ptr<MovieOutput> output =
       is_picture ? std::make_unique<OnePicture>(file) : open(file, size, movie.frames_per_s);
-  StepPlayer player(movie.cache, functions.scalars(movie.cache, state), movie.backend);
-  if (movie.kind != MovieKind::kAllSteps) {
-    player.goTo(shown_at);
-    faces_at(shown_at.step);
-  }
+  StepPlayer player(movie.cache, functions->scalars(movie.cache, state), movie.backend);
+  player.goTo(shown_at);
   progress.begin("drawing frames", frames, "frames");
   for (uint64_t frame = 0; frame < frames; ++frame) {
     Camera camera = state.camera;
+    StepPosition at = shown_at;
     if (movie.kind == MovieKind::kOneTurn) {
       camera = orbited(camera, 360.0 * static_cast<double>(frame) / static_cast<double>(frames));
     } else if (movie.kind == MovieKind::kAllSteps) {
-      player.goTo({frame});
-      faces_at(frame);
+      at = {frame};
+    } else if (film) {
+      const double time = movie.film_times[frame];
+      show(*film, time, state);
+      camera = magnified(state.camera, movie.magnification);
+      at = positionOf(*film, time, movie.cache.series(), movie.interpolates).value_or(shown_at);
+      if (film->functionsChange()) {
+        functions.emplace(state, movie.cache.manifest());
+        player.setFunctions(functions->scalars(movie.cache, state));
+      }
     }
+    player.goTo(at);
+    if (frame == 0 || film || movie.kind == MovieKind::kAllSteps) take_options(at.step);
     Progress of_frame;
     of_frame.stopWith(progress);
     ShownFrame drawn;
     drawn.view = player.renderer().screenView(camera, options);
     drawn.data = {movie.cache.manifest().lower, movie.cache.manifest().upper};
     drawn.image = drawWithEnough(player.renderer(), camera, options, drawn.statistics, of_frame);
-    const AnnotatedScene shown = sceneOf(state, functions, drawn, size);
+    memory_bytes = options.memory_bytes;
+    const AnnotatedScene shown = sceneOf(state, *functions, drawn, size);
     output->write(frame, annotated(std::move(drawn.image), state.annotations, shown));
     progress.advance(1);
   }

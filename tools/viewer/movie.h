@@ -1,5 +1,5 @@
-// A movie of what the window shows: once around the focal point, or all time steps; or one picture of another size than the
-// window's. Drawn in the background.
+// A movie of what the window shows: once around the focal point, all time steps, or a film of key frames; or one picture of
+// another size than the window's. Drawn in the background.
 #pragma once
 
 #include <cstdint>
@@ -7,17 +7,19 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "render/backend/backend.h"
 #include "render/image/image.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
+#include "tools/view/film_edit.h"
 #include "tools/view/frame_loop.h"
 #include "tools/view/view_state.h"
 
 namespace curvisplat {
 
-enum class MovieKind { kOneTurn, kAllSteps, kOnePicture };
+enum class MovieKind { kOneTurn, kAllSteps, kOnePicture, kFilm };
 
 /// Takes the pictures 0, 1, 2, ...; unless finish() is called, nothing is left of a movie. Throws Error.
 class MovieOutput {
@@ -43,9 +45,13 @@ struct MovieRequest {
   FacesAtStep faces_at = {};               // needed where the state has faces
   bool keep_going = false;                 // past damaged bricks
   std::shared_ptr<const void> keeps = {};  // the folder of a preview
+  std::shared_ptr<const Film> film = {};   // of kFilm
+  std::vector<double> film_times = {};     // of its frames
+  bool interpolates = false;               // a film between time steps, too
+  double magnification = 1;                // of a film's pictures: of another shape than the window's
 };
 
-/// Frames of a movie: 90 once around, as `render --orbit 360` draws; one a time step; or one.
+/// Frames of a movie: 90 once around, as `render --orbit 360` draws; one a time step; of a film those of its times; or one.
 uint64_t framesOf(const MovieRequest& movie);
 /// "90 pictures of 1280 x 800, 3.6 s".
 std::string textOf(const MovieRequest& movie);

@@ -229,7 +229,8 @@ class Viewer {
 
   bool isEnabled(Command command) const {
     if (actionOf(actions(), command)) return true;
-    const bool is_movie = command == Command::kSaveTurnMovie || command == Command::kSaveStepsMovie;
+    const bool is_movie = command == Command::kSaveTurnMovie || command == Command::kSaveStepsMovie ||
+                          command == Command::kSaveFilmMovie;
     return !(is_movie && movie_) && opened_.view() && opened_.view()->isEnabled(command);
   }
 

@@ -39,6 +39,10 @@ Look lookOf(FileDialog::Purpose purpose) {
       return {"Save picture", "save", true, {".png", ".exr", ".pfm"}};
     case FileDialog::Purpose::kOpenSurface:
       return {"Add a surface", "add", false, {".stl", ".ply", ".obj"}};
+    case FileDialog::Purpose::kOpenFilm:
+      return {"Open a film", "open", false, {".json"}};
+    case FileDialog::Purpose::kSaveFilm:
+      return {"Save film", "save", true, {".json"}};
     case FileDialog::Purpose::kSaveMovie:
       return {"Save movie", "save", true, {".mp4", ".gif", ".png"}};
   }

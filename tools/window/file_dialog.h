@@ -33,7 +33,16 @@ std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
 
 class FileDialog {
  public:
-  enum class Purpose { kOpenData, kLoadFunction, kSaveFunction, kSavePicture, kSaveMovie, kOpenSurface };
+  enum class Purpose {
+    kOpenData,
+    kLoadFunction,
+    kSaveFunction,
+    kSavePicture,
+    kSaveMovie,
+    kOpenSurface,
+    kOpenFilm,
+    kSaveFilm
+  };
   struct Chosen {
     Purpose purpose;
     std::vector<std::filesystem::path> files;

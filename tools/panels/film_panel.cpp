@@ -1,0 +1,180 @@
+#include "tools/panels/film_panel.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+namespace curvisplat {
+namespace {
+
+constexpr int kPicturesInRow = 4;
+
+std::string nameOf(size_t key) {
+  return fmt::format("key frame {}", key + 1);
+}
+
+ImU32 accent() {
+  return ImGui::GetColorU32(ImGuiCol_CheckMark);
+}
+
+/// A button of the film's; `id` names it for tests.
+bool button(const char* text, const char* id, bool enabled, const char* help) {
+  ImGui::BeginDisabled(!enabled);
+  const bool pressed = ImGui::Button(fmt::format("{}##film", text).c_str());
+  ImGui::EndDisabled();
+  nameWidget(id);
+  if (help) hint(help);
+  return pressed;
+}
+
+}  // namespace
+
+void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelActions& actions) {
+  FilmActions& does = actions.film;
+  const bool has_keys = !film.keys().empty(), selects = film.selected().has_value();
+  if (has_keys) {
+    drawPictures(film, pictures, does);
+    drawTimeLine(film, actions);
+    drawTime(film, does);
+  } else {
+    ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+    ImGui::TextWrapped(
+        "A key frame keeps the camera, the colours, the cuts and the time step. Add one, change the picture, "
+        "add the next.");
+    ImGui::PopStyleColor();
+  }
+  does.add |=
+      button("add key frame", "add key frame", true, "of what is shown now, after the one that is selected");
+  ImGui::SameLine();
+  does.replace |= button("update", "update key frame", selects, "the selected one shows what is shown now");
+  ImGui::SameLine();
+  does.remove |= button("delete", "delete key frame", selects, "the selected one");
+  ImGui::SameLine();
+  does.play |= button(film.isPlaying() ? "stop" : "play", "play film", film.end() > 0, nullptr);
+  does.open |= button("open...", "open film", true, "a file of key frames, as render --path draws it");
+  ImGui::SameLine();
+  does.save |=
+      button("save...", "save film", has_keys, "the key frames, for render --path and for the next time");
+  ImGui::SameLine();
+  ImGui::BeginDisabled(!has_keys);
+  commandButton(Command::kSaveFilmMovie, actions, "movie...");
+  ImGui::SameLine();
+  commandButton(Command::kCopyFilmCommand, actions, "copy command");
+  ImGui::EndDisabled();
+}
+
+void FilmPanel::drawPictures(const FilmEdit& film, const FilmPictures& pictures, FilmActions& actions) {
+  const float gap = 0.4f * ImGui::GetFontSize();
+  const float width =
+      std::floor((ImGui::GetContentRegionAvail().x - (kPicturesInRow - 1) * gap) / kPicturesInRow);
+  const float height = std::floor(static_cast<float>(kShape) * width);
+  const float rounding = ImGui::GetStyle().FrameRounding;
+  const auto selected = film.selected();
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {gap, gap});
+  for (size_t n = 0; n < film.keys().size(); ++n) {
+    const FilmEdit::Key& key = film.keys()[n];
+    if (n % kPicturesInRow != 0) ImGui::SameLine();
+    const ImVec2 from = ImGui::GetCursorScreenPos(), to{from.x + width, from.y + height};
+    ImGui::PushID(static_cast<int>(key.picture));
+    const std::string time = fmt::format("{:.4g} s", key.frame.time);
+    if (ImGui::InvisibleButton("picture", {width, height + ImGui::GetTextLineHeight()})) actions.select = n;
+    ImGui::PopID();
+    nameWidget(nameOf(n));
+    void* const texture = pictures(key.picture);
+    if (texture) {
+      list->AddImageRounded(texture, from, to, {0, 0}, {1, 1}, 0xffffffff, rounding);
+      nameArea(nameOf(n) + " drawn", static_cast<double>(from.x), static_cast<double>(from.y),
+               static_cast<double>(width), static_cast<double>(height));
+    } else {
+      list->AddRectFilled(from, to, ImGui::GetColorU32(ImGuiCol_FrameBg), rounding);
+    }
+    const bool marked = n == selected;
+    const ImU32 edge = marked                   ? accent()
+                       : ImGui::IsItemHovered() ? ImGui::GetColorU32(ImGuiCol_TextDisabled)
+                                                : ImGui::GetColorU32(ImGuiCol_Border);
+    list->AddRect(from, to, edge, rounding, 0, marked ? 2.0f : 1.0f);
+    const float text = ImGui::CalcTextSize(time.c_str()).x;
+    list->AddText({from.x + 0.5f * (width - text), to.y},
+                  ImGui::GetColorU32(marked ? ImGuiCol_Text : ImGuiCol_TextDisabled), time.c_str());
+  }
+  ImGui::PopStyleVar();
+}
+
+void FilmPanel::drawTimeLine(const FilmEdit& film, PanelActions& actions) {
+  const float unit = ImGui::GetFontSize(), half = 0.45f * unit;
+  const float width = ImGui::GetContentRegionAvail().x - 2 * half;
+  const ImVec2 corner = ImGui::GetCursorScreenPos();
+  const float y = corner.y + unit, left = corner.x + half;
+  // There is space to move the last one; the scale stays while it is moved.
+  const double extent = extent_s_.value_or(std::max(2 * FilmEdit::kApart, 1.25 * film.end()));
+  const auto placeOf = [&](double time) { return left + width * static_cast<float>(time / extent); };
+  const auto timeUnderMouse = [&] {
+    const double share = static_cast<double>((ImGui::GetIO().MousePos.x - left) / width);
+    return std::clamp(share, 0.0, 1.0) * extent;
+  };
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const float line = std::max(1.0f, 0.12f * unit);
+  list->AddLine({left, y}, {left + width, y}, ImGui::GetColorU32(ImGuiCol_FrameBgHovered), line);
+  list->AddLine({left, y}, {placeOf(film.end()), y}, ImGui::GetColorU32(ImGuiCol_TextDisabled), line);
+  const float now = placeOf(film.time());
+  list->AddLine({now, y - 0.8f * unit}, {now, y + 0.8f * unit}, accent(), line);
+  const auto selected = film.selected();
+  bool dragging = false;
+  for (size_t n = 0; n < film.keys().size(); ++n) {
+    const FilmEdit::Key& key = film.keys()[n];
+    const float x = placeOf(key.frame.time);
+    ImGui::SetCursorScreenPos({x - half, y - half});
+    ImGui::PushID(static_cast<int>(key.picture));
+    ImGui::InvisibleButton("mark", {2 * half, 2 * half});
+    ImGui::PopID();
+    nameWidget("mark of " + nameOf(n));
+    const float mouse = ImGui::GetIO().MousePos.x;
+    if (ImGui::IsItemActivated()) {
+      actions.film.select = n;
+      pressed_x_ = mouse;
+      moves_ = false;
+    }
+    dragging |= ImGui::IsItemActive();
+    // The button may have been pressed, moved and released between two frames.
+    if (ImGui::IsItemActive() || ImGui::IsItemDeactivated()) {
+      moves_ |= std::abs(mouse - pressed_x_) >= ImGui::GetIO().MouseDragThreshold;
+      const double frame = std::round(timeUnderMouse() * FilmEdit::kFramesPerSecond);
+      if (moves_) actions.film.move = {n, frame / FilmEdit::kFramesPerSecond};
+    }
+    const ImU32 colour =
+        n == selected || ImGui::IsItemHovered() ? accent() : ImGui::GetColorU32(ImGuiCol_Text);
+    list->AddQuadFilled({x - half, y}, {x, y - half}, {x + half, y}, {x, y + half}, colour);
+  }
+  ImGui::SetCursorScreenPos(corner);
+  ImGui::InvisibleButton("time line", {width + 2 * half, 2 * unit});
+  nameWidget("film time line");
+  if (ImGui::IsItemActive()) {
+    dragging = true;
+    actions.film.go_to = timeUnderMouse();
+  }
+  extent_s_ = dragging ? std::optional(extent) : std::nullopt;
+  actions.dragging |= dragging;
+}
+
+void FilmPanel::drawTime(const FilmEdit& film, FilmActions& actions) {
+  const auto selected = film.selected();
+  label("at second");
+  ImGui::BeginDisabled(!selected);
+  const std::array<double, 1> shown{film.time()};
+  ImGui::SetNextItemWidth(5 * ImGui::GetFontSize());
+  if (const auto typed = typed_.draw("##film time", shown, "%.2f"); typed && selected)
+    actions.move = {*selected, (*typed)[0]};
+  nameWidget("film time");
+  ImGui::EndDisabled();
+  ImGui::SameLine();
+  const std::string length = fmt::format("of {:.4g} s, {} pictures", film.end(), film.frames());
+  ImGui::TextDisabled("%s", length.c_str());
+  nameWidget("film length " + length);
+}
+
+}  // namespace curvisplat

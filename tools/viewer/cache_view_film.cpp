@@ -1,0 +1,156 @@
+// The film of a view: its key frames as the panel edits them, playing it, its file, and the small pictures of its key frames,
+// which are drawn in the background.
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "stream/base/error.h"
+#include "tools/viewer/cache_view.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kPictureSize{144, static_cast<int>(FilmPanel::kShape * 144)};
+constexpr uint64_t kPictureMemory = 128 << 20;
+
+/// Keeps the pictures of a movie in memory.
+class KeptPictures final : public MovieOutput {
+ public:
+  explicit KeptPictures(std::vector<Image>& images) : images_(images) {}
+  void write(uint64_t, const Image& image) override { images_.push_back(image); }
+  void finish() override {}
+
+ private:
+  std::vector<Image>& images_;
+};
+
+}  // namespace
+
+/// Draws small pictures; `images` are complete once `job` is done.
+struct CacheView::FilmPicturesJob {
+  FilmPicturesJob(std::vector<uint64_t> drawn, MovieRequest request)
+      : numbers(std::move(drawn)),
+        job(
+            "small pictures", "beginning",
+            [this, movie = std::make_shared<MovieRequest>(std::move(request))](Progress& progress) {
+              const OpenMovieOutput open = [this](const std::filesystem::path&, ImageSize, double) {
+                return std::make_unique<KeptPictures>(images);
+              };
+              return drawMovie(*movie, open, progress);
+            },
+            Window::wake) {}
+
+  const std::vector<uint64_t> numbers;
+  std::vector<Image> images;
+  BackgroundJob job;
+};
+
+std::optional<double> CacheView::seriesTime() const {
+  if (!isSeries()) return std::nullopt;
+  return cache_.series().timeAt(playback_.position());
+}
+
+void CacheView::apply(const FilmActions& actions) {
+  if (actions.add) addKeyFrame(false);
+  if (actions.replace) addKeyFrame(true);
+  if (actions.remove) film_.remove();
+  if (actions.play) film_.isPlaying() ? film_.stop() : playFilm();
+  if (actions.open) dialog_.open(FileDialog::Purpose::kOpenFilm);
+  if (actions.save)
+    dialog_.open(FileDialog::Purpose::kSaveFilm, cache_.wholePath().stem().string() + "_film.json");
+  if (actions.move) film_.move(actions.move->first, actions.move->second);
+  if (actions.select) film_.goTo(film_.keys()[*actions.select].frame.time);
+  if (actions.go_to) film_.goTo(*actions.go_to);
+  if (actions.remove || actions.select || actions.go_to) showFilm(true);
+}
+
+void CacheView::addKeyFrame(bool replaces) {
+  // A movement that has not come to rest is in it.
+  replaces ? film_.replace(state_, seriesTime()) : film_.add(state_, seriesTime());
+}
+
+/// The view with the film's scalar.
+ViewState CacheView::stateOfFilm() const {
+  const std::string& scalar = film_.film()->scalar();
+  ViewState state = state_;
+  if (state.variable == scalar) return state;
+  if (state.opacity_by && state.opacity_by->variable == scalar) state.opacity_by.reset();
+  chooseVariable(state, manifest(), scalar);
+  return state;
+}
+
+/// Shows the film at its time. `whole_function`: the function may be another one than before.
+void CacheView::showFilm(bool whole_function) {
+  const Film* const film = film_.film().get();
+  if (!film) return;
+  whole_function |= state_.variable != film->scalar();
+  state_ = stateOfFilm();
+  chooser_.drop(FunctionChooser::For::kScalar);
+  chooser_.drop(FunctionChooser::For::kSameScalar);
+  show(*film, film_.time(), state_);
+  if (const auto at = positionOf(*film, film_.time(), cache_.series(), playback_.interpolates()))
+    playback_.goTo(*at);
+  if (whole_function) ++function_version_;
+  panels_.forgetObjects();
+  changed_ = true;
+}
+
+void CacheView::playFilm() {
+  if (playback_.isPlaying()) playback_.toggle();
+  film_.play(glfwGetTime());
+  showFilm(true);
+}
+
+void CacheView::openFilm(const std::filesystem::path& file) {
+  const Film film = Film::fromFile(file);
+  ViewState state = state_;
+  if (!film.scalar().empty() && film.scalar() != state.variable)
+    chooseVariable(state, manifest(), film.scalar());
+  film_.open(film, state, seriesTime());
+  showFilm(true);
+}
+
+MovieRequest CacheView::filmMovie(const std::filesystem::path& file, std::vector<double> times) const {
+  MovieRequest movie{MovieKind::kFilm, file, cache_.at(playback_.position()), stateOfFilm(), picture_size_};
+  movie.frames_per_s = FilmEdit::kFramesPerSecond;
+  movie.film = film_.film();
+  movie.film_times = std::move(times);
+  movie.interpolates = playback_.interpolates();
+  movie.backend = backend_;
+  movie.faces_at = faces_at_;
+  movie.keep_going = !damaged_.empty();
+  if (preview_) movie.keeps = preview_->folder;
+  return movie;
+}
+
+/// Takes the small pictures that have been drawn, and begins to draw those that are missing.
+void CacheView::drawFilmPictures() {
+  if (film_job_ && !film_job_->job.isDone()) return;
+  if (const auto done = std::exchange(film_job_, nullptr)) {
+    for (size_t n = 0; n < done->images.size(); ++n) {
+      const Image& image = done->images[n];
+      film_pictures_.at(done->numbers[n]).set(bytesOf(image), image.size);
+    }
+    window_.redraw();
+    done->job.get();  // throws; what failed stays empty
+  }
+  std::vector<uint64_t> missing;
+  std::vector<double> times;
+  for (const FilmEdit::Key& key : film_.keys()) {
+    // One that cannot be drawn stays empty: it is not tried again.
+    if (!film_pictures_.try_emplace(key.picture, window_.gl()).second) continue;
+    missing.push_back(key.picture);
+    times.push_back(key.frame.time);
+  }
+  if (missing.empty()) return;
+  MovieRequest movie = filmMovie("pictures.png", std::move(times));
+  movie.size = kPictureSize;
+  // They show the width of the picture in the window, or its height.
+  movie.magnification = std::max(1.0, data_size_.height / FilmPanel::kShape / std::max(1, data_size_.width));
+  movie.state.annotations = {};
+  movie.state.memory_bytes = std::min(movie.state.memory_bytes, kPictureMemory);
+  film_job_ = std::make_shared<FilmPicturesJob>(std::move(missing), std::move(movie));
+}
+
+}  // namespace curvisplat
