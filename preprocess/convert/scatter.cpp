@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "preprocess/convert/shared_passes.h"
@@ -206,10 +207,10 @@ class RecordSink : public SplatSink {
 
  private:
   /// Whether a splat can be one of the grid that was measured. Fits may move it beyond the nodes, and their axes
-  /// reach further, but not by several times the grid.
+  /// reach further, but not by several times the grid. Weights have no such limit: cells may lie on one another.
   bool isOfRoot(const Splat& splat) const {
     const double reach = kReachOfRoot * root_.size;
-    bool is_of_root = splat.weight >= 0 && splat.weight <= reach * reach * reach;
+    bool is_of_root = splat.weight >= 0 && splat.weight <= std::numeric_limits<float>::max();
     for (int axis = 0; axis < 3; ++axis)
       is_of_root &= std::abs(splat.position[axis] - root_.min[axis]) <= reach && splat.axis[axis] <= reach &&
                     !std::isnan(splat.shear[axis]);

@@ -359,6 +359,12 @@ class Messages(FormatCase):
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertEqual(sorted(self.folder.iterdir()), before)
 
+    def test_thousands_of_tetrahedra_on_one_another_are_converted(self):
+        zone = "ZONE N=4, E=1, ZONETYPE=FETETRAHEDRON, DATAPACKING=POINT\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n1 2 3 4\n"
+        path = self.write("many.dat", 'VARIABLES="x" "y" "z" "p"\n' + zone * 13000)
+        done = self.run_program("convert", path, "-o", self.folder / "many.splats")
+        self.assertEqual(done.returncode, 0, done.stderr)
+
 
 if __name__ == "__main__":
     unittest.main()
