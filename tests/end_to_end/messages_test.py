@@ -358,6 +358,11 @@ class Messages(FormatCase):
                               capture_output=True, text=True)
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertEqual(sorted(self.folder.iterdir()), before)
+        done = subprocess.run([PROGRAM, "convert", "w.xyz", "w_%04d.fun", "-o", "w.splats", "--part", "1/2", "--memory", "1"], cwd=self.folder,
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("--memory", done.stderr)
+        self.assertEqual(sorted(self.folder.iterdir()), before)
 
     def test_thousands_of_tetrahedra_on_one_another_are_converted(self):
         zone = "ZONE N=4, E=1, ZONETYPE=FETETRAHEDRON, DATAPACKING=POINT\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n1 2 3 4\n"

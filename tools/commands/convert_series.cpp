@@ -1,6 +1,7 @@
 #include "tools/commands/convert_series.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -223,8 +224,14 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   StepLog log(progress);
-  const SeriesReport report =
-      convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
+  const SeriesReport report = [&] {
+    try {
+      return convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
+    } catch (...) {
+      ::rmdir(folder.c_str());  // if nothing is in it
+      throw;
+    }
+  }();
   writePartRecord(folder, part, steps.size(), report.origins);
   printSums(report, options.convert.output);
   writeSeriesStatistics(arguments, report, log, progress);
