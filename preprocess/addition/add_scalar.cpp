@@ -22,6 +22,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/memory.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/faces_file.h"
@@ -35,7 +36,7 @@ void checkNames(const std::vector<std::string>& names, const CacheReader& cache)
   for (const std::string& name : names)
     if (std::find(present.begin(), present.end(), name) != present.end())
       throw UsageError("{}: already has a scalar '{}'; it has {}", cache.path().string(), name,
-                       fmt::join(present, ", "));
+                       listed(present));
 }
 
 std::filesystem::path temporaryFolder(const AddScalarOptions& options) {
@@ -129,7 +130,7 @@ class Addition {
       report_.warnings.push_back(
           fmt::format("left out: the values of {} at {}, where the scalars of the cache have none; to keep "
                       "them, convert again with all scalars",
-                      fmt::join(report_.scalars, ", "), countText(values, "sample")));
+                      listed(report_.scalars), countText(values, "sample")));
   }
 
   bool isFirst() const { return ranks_.isFirst(); }
@@ -175,7 +176,7 @@ class Addition {
       throw Error(
           "{}: {} of its samples have no value of {} ({} not finite in single precision, {} with the blank "
           "value), and every splat needs one; convert again with all scalars",
-          cache_.path().string(), missing, fmt::join(report_.scalars, ", "), survey_.blanked.not_finite,
+          cache_.path().string(), missing, listed(report_.scalars), survey_.blanked.not_finite,
           survey_.blanked.by_value);
     checkRanges(survey_, description_, options_.scalars);
     const auto inside = [](const glm::dvec3& a, const glm::dvec3& b) {
@@ -198,8 +199,7 @@ class Addition {
     const bool cells = (mesh_ ? origin_->centring() : reader_->centring()) == Centring::kCell;
     if (cells != manifest().cells)
       throw Error("{}: its scalars are {}-centred, but {} is {}-centred; convert it to a cache of its own",
-                  cache_.path().string(), words(manifest().cells), fmt::join(report_.scalars, ", "),
-                  words(cells));
+                  cache_.path().string(), words(manifest().cells), listed(report_.scalars), words(cells));
   }
 
   void scatter() {

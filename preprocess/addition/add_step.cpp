@@ -25,6 +25,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/memory.h"
+#include "stream/base/name_list.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_update.h"
 #include "stream/cache/faces_file.h"
@@ -346,7 +347,7 @@ class SetsAddition {
 
   void end(const std::vector<std::string>& names, const char* reason) {
     report_.warnings.push_back(
-        fmt::format("{}: {} at this step; kept up to the step before", fmt::join(names, ", "), reason));
+        fmt::format("{}: {} at this step; kept up to the step before", listed(names), reason));
   }
 
   const DataSource& source_;

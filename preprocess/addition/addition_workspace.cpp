@@ -10,6 +10,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -54,11 +55,7 @@ std::string lacking(const char* words, const std::vector<Some>& some, const std:
                      [&](const Others& other) { return other.name == one.name; }))
       names.push_back(one.name);
   if (names.empty()) return "";
-  const size_t listed = std::min(kNamesListed, names.size());
-  std::string text = fmt::format(
-      " ({}{}", words, fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(listed), ", "));
-  if (names.size() > listed) text += fmt::format(" and {} more", names.size() - listed);
-  return text + ")";
+  return fmt::format(" ({}{})", words, listed(names, kNamesListed));
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "stream/base/checksum.h"
 #include "stream/base/file.h"
+#include "stream/base/name_list.h"
 #include "stream/base/ranks.h"
 #include "stream/cache/series.h"
 
@@ -152,7 +153,7 @@ class SetsConversion {
   }
 
   std::string listed(const Scalars& scalars) const {
-    return fmt::format("{}", fmt::join(namesOf(description_, scalars), ", "));
+    return curvisplat::listed(namesOf(description_, scalars));
   }
 
   const GridDescription& description_;

@@ -12,6 +12,7 @@
 
 #include "render/mesh/curve_set.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -214,11 +215,12 @@ Columns columnsOf(const Rows& rows, const std::vector<std::string_view>& names, 
   }
   columns.geographic = std::find(along.begin(), along.end(), kNoColumn) != along.end();
   if (columns.geographic && (on_globe[0] == kNoColumn || on_globe[1] == kNoColumn))
-    rows.fail("has no columns x, y and z, nor lon and lat, among {}; name them so", fmt::join(names, ", "));
+    rows.fail("has no columns x, y and z, nor lon and lat, among {}; name them so",
+              listed(std::vector<std::string>(names.begin(), names.end())));
   columns.position = columns.geographic ? on_globe : along;
   if (!scalar.empty() && !columns.scalar)
     rows.fail("has no column '{}'{}; it has {}", scalar, didYouMean(scalar, scalars),
-              scalars.empty() ? "x, y and z only" : fmt::format("{}", fmt::join(scalars, ", ")));
+              scalars.empty() ? "x, y and z only" : listed(scalars));
   return columns;
 }
 

@@ -13,6 +13,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 #include "stream/base/threads.h"
 #include "stream/cache/cache_index.h"
@@ -393,10 +394,10 @@ size_t CacheReader::variableNamed(std::string_view name) const {
   const std::span<const std::string> own(names.data(), variables.size());
   if (std::ranges::find(names, name) != names.end())
     throw UsageError("{}: {} has values at other samples than {}; it is drawn without them, by --scalar",
-                     path().string(), name, fmt::join(own, ", "));
+                     path().string(), name, listed(own));
   if (variables.empty()) throw UsageError("{}: the cache has no scalars", path().string());
   throw UsageError("{}: the cache has no scalar '{}'{}; it has {}", path().string(), name,
-                   didYouMean(name, names), fmt::join(names, ", "));
+                   didYouMean(name, names), listed(names));
 }
 
 const fs::path& CacheReader::geometryPath() const {

@@ -364,6 +364,18 @@ class Messages(FormatCase):
         self.assertIn("--memory", done.stderr)
         self.assertEqual(sorted(self.folder.iterdir()), before)
 
+    def test_lists_of_names_are_cut_wherever_they_stand(self):
+        markers = "".join(f"MARKER_TAG= wall{n}\nMARKER_ELEMS= 0\n" for n in range(1000))
+        path = self.write("many.su2", "NDIME= 3\nNELEM= 1\n10 0 1 2 3 0\nNPOIN= 4\n0 0 0 0\n1 0 0 1\n0 1 0 2\n0 0 1 3\n"
+                          f"NMARK= 1000\n{markers}")
+        self.assertIn("wall39 and 960 more", self.run_program("info", path).stdout)
+        self.run_program("generate", "wake", "--size", "5x4x3", "-o", self.folder / "w")
+        self.run_program("convert", self.folder / "w.xyz", self.folder / "w.fun", "-o", self.folder / "w.splats")
+        path = self.write("many.csv", "x,y,z," + ",".join(f"v{n}" for n in range(1000)) + "\n0,0,0" + ",1" * 1000 + "\n")
+        refused = self.run_program("render", self.folder / "w.splats", "-o", self.folder / "w.png", "--lines", path, "--lines-by", "absent")
+        self.assertEqual(refused.returncode, 1, refused.stderr)
+        self.assertIn("v38, v39 and 960 more", refused.stderr)
+
     def test_thousands_of_tetrahedra_on_one_another_are_converted(self):
         zone = "ZONE N=4, E=1, ZONETYPE=FETETRAHEDRON, DATAPACKING=POINT\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n1 2 3 4\n"
         path = self.write("many.dat", 'VARIABLES="x" "y" "z" "p"\n' + zone * 13000)

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 #include "tools/options/picture_choice.h"
 
@@ -81,12 +82,6 @@ namespace {
 
 constexpr size_t kNamesListed = 8, kMaxOffered = 400;
 
-std::string listed(const std::vector<std::string>& names) {
-  const size_t count = std::min(names.size(), kNamesListed);
-  return fmt::format("{}{}", fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(count), ", "),
-                     count < names.size() ? fmt::format(" and {} more", names.size() - count) : "");
-}
-
 /// The parts that cells of the files' grid, whose indices names have, are cut into.
 uint64_t partsOf(const Manifest& manifest, size_t block, int axis) {
   return block < manifest.blocks.size() ? manifest.refinement.ofBlock(block)[static_cast<size_t>(axis)] : 1;
@@ -111,12 +106,13 @@ std::string whatThereIs(const FacesReader& faces, const Manifest& manifest) {
   std::set<std::string> known;
   for (const GridFace& face : faces.faces())
     if (const std::string name = nameOf(face, manifest); known.insert(name).second) names.push_back(name);
-  std::string text = "it has the faces " + listed(names);
+  std::string text = "it has the faces " + listed(names, kNamesListed);
   std::vector<std::string> boundaries;
   for (const FaceRegion& region : faces.regions())
     if (const std::string name = fmt::format("{} ({})", region.name, region.type); known.insert(name).second)
       boundaries.push_back(name);
-  text += boundaries.empty() ? ", and no boundary conditions" : ", and the boundaries " + listed(boundaries);
+  text += boundaries.empty() ? ", and no boundary conditions"
+                             : ", and the boundaries " + listed(boundaries, kNamesListed);
   return text;
 }
 

@@ -8,6 +8,7 @@
 
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/cache/probe.h"
 #include "tools/view/edited_function.h"
 #include "tools/view/first_view.h"
@@ -77,7 +78,7 @@ ServedCaches::ServedCaches(const std::vector<fs::path>& paths) {
     add(name, reader.at(reader.position()));
     const std::vector<OwnBlanks>& sets = reader.seriesManifest().own_blanks;
     for (size_t n = 0; n < sets.size(); ++n)
-      add(fmt::format("{}: {}", name, fmt::join(sets[n].variables, ", ")), reader.ownBlanks(n));
+      add(fmt::format("{}: {}", name, listed(sets[n].variables)), reader.ownBlanks(n));
   }
 }
 

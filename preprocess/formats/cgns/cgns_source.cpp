@@ -20,6 +20,7 @@
 #include "preprocess/formats/common/block_source.h"
 #include "preprocess/formats/common/element_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -134,8 +135,7 @@ void warnOfGaps(const CgnsTree& tree, const ArraysOfScalars& arrays_of, GridDesc
       names += (n ? ", " : "") + zoneName(tree, zones[n]);
     if (zones.size() > kNamesListed) names += fmt::format(" and {} more", zones.size() - kNamesListed);
     description.warnings.push_back(fmt::format("{} of {} zones ({}) have no {}; they are not drawn with it",
-                                               zones.size(), tree.zones.size(), names,
-                                               fmt::join(scalars, ", ")));
+                                               zones.size(), tree.zones.size(), names, listed(scalars)));
   }
 }
 

@@ -13,6 +13,7 @@
 #include "preprocess/formats/cgns/cgns_solutions.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -157,17 +158,12 @@ void TreeReader::addHoles(const CgnsNode& node, CgnsZone& zone) {
 }
 
 void TreeReader::writeNotes() {
-  const auto listed = [](const std::vector<std::string>& names) {
-    const size_t count = std::min<size_t>(names.size(), 8);
-    const std::string more = names.size() > count ? fmt::format(" and {} more", names.size() - count) : "";
-    return fmt::format("{}{}", fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(count), ", "),
-                       more);
-  };
+  constexpr size_t kMaxListed = 8;
   std::vector<std::string> conditions;
   for (const auto& [type, count] : conditions_) conditions.push_back(fmt::format("{} {}", type, count));
-  if (!conditions.empty()) tree_.notes.push_back("boundary conditions: " + listed(conditions));
-  if (!families_.empty()) tree_.notes.push_back("families: " + listed(families_));
-  if (!units_.empty()) tree_.notes.push_back("units: " + listed(units_));
+  if (!conditions.empty()) tree_.notes.push_back("boundary conditions: " + listed(conditions, kMaxListed));
+  if (!families_.empty()) tree_.notes.push_back("families: " + listed(families_, kMaxListed));
+  if (!units_.empty()) tree_.notes.push_back("units: " + listed(units_, kMaxListed));
   if (holes_ > 0) tree_.notes.push_back("overset holes: " + countText(holes_, "set"));
 }
 

@@ -13,6 +13,7 @@
 #include "preprocess/formats/netcdf/cf_grid.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -108,9 +109,7 @@ void ColumnsSource::describe(const OpenGridOptions& options) {
   const std::vector<std::string> others = structuredVariables(file_);
   if (!others.empty())
     description_.warnings.push_back(fmt::format(
-        "left out: {}{}, on a structured grid; choose it with --scalar {}",
-        fmt::join(others.begin(), others.begin() + std::min<ptrdiff_t>(3, std::ssize(others)), ", "),
-        others.size() > 3 ? fmt::format(" and {} more", others.size() - 3) : "", others.front()));
+        "left out: {}, on a structured grid; choose it with --scalar {}", listed(others, 3), others.front()));
   const auto& warnings = file_.warnings();
   description_.warnings.insert(description_.warnings.end(), warnings.begin(), warnings.end());
 }

@@ -12,6 +12,7 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -252,8 +253,8 @@ EnsightCase CaseReader::run(std::optional<uint32_t> step) {
     result.variables.push_back(std::move(one.variable));
   }
   if (!skipped_.empty())
-    result.warnings.push_back(fmt::format(
-        "left out: {}; scalars and vectors per node and per element are read", fmt::join(skipped_, ", ")));
+    result.warnings.push_back(
+        fmt::format("left out: {}; scalars and vectors per node and per element are read", listed(skipped_)));
   return result;
 }
 

@@ -14,6 +14,7 @@
 #include "preprocess/formats/netcdf/fms_mosaic.h"
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "stream/base/calendar.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -181,7 +182,7 @@ class GridFinder {
         {variable.name,
          fmt::format("{} dimensions besides time ({}); expected 3: choose one value of the others, such as "
                      "--select {}={:g}",
-                     names.size(), fmt::join(names, ", "), chosen, first)});
+                     names.size(), listed(names), chosen, first)});
   }
 
   /// Names of the dimensions on which there are coordinates of space.

@@ -15,6 +15,7 @@
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/formats/netcdf/zarr_file.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -163,7 +164,7 @@ class TrajectoryReader {
     }
     if (!scalar_name_.empty() && !scalar_)
       fail(fmt::format("has no variable '{}'{} along its trajectories; it has {}", scalar_name_,
-                       didYouMean(scalar_name_, names), fmt::join(names, ", ")));
+                       didYouMean(scalar_name_, names), listed(names)));
     if (time_) result_.time_unit = {time_.variable->text("units"), time_.variable->text("calendar")};
   }
 

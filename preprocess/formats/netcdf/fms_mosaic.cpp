@@ -11,6 +11,7 @@
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -112,7 +113,7 @@ std::vector<std::string> gridsOfComponent(const path& coupled, const std::vector
     throw Error(
         "{}: names the mosaics {}; none of them with {} is beside it; put it there, or give the grid files "
         "of the data",
-        coupled.string(), fmt::join(mosaics, ", "), tiles ? "tiles" : "a grid of one tile");
+        coupled.string(), listed(mosaics), tiles ? "tiles" : "a grid of one tile");
   if (fitting.size() > 1)
     throw Error("{}: names several grids ({}, {}); give the one of the data in its place", coupled.string(),
                 fitting[0][0], fitting[1][0]);

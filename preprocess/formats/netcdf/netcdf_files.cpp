@@ -10,6 +10,7 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/netcdf/zarr_file.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -72,7 +73,7 @@ void NetcdfFiles::select(const std::string& choice) {
   }
   if (!found)
     throw UsageError("--select {}: {} has no dimension '{}'{}; it has {}", choice, path().string(), name,
-                     didYouMean(name, names), fmt::join(names, ", "));
+                     didYouMean(name, names), listed(names));
   selected_ += fmt::format("{}{} {}", selected_.empty() ? "" : ", ", name, choice.substr(sign + 1));
 }
 
@@ -141,12 +142,8 @@ void NetcdfFiles::add(size_t number) {
     for (size_t& dim : added.dims) dim = merged.at(dim);
   }
   if (twice.empty()) return;
-  const size_t listed = std::min(kNamesListed, twice.size());
-  std::string names =
-      fmt::format("{}", fmt::join(twice.begin(), twice.begin() + static_cast<ptrdiff_t>(listed), ", "));
-  if (twice.size() > listed) names += fmt::format(" and {} more", twice.size() - listed);
-  warnings_.push_back(
-      fmt::format("left out: {} of {}: an earlier file has the same variables", names, file.path().string()));
+  warnings_.push_back(fmt::format("left out: {} of {}: an earlier file has the same variables",
+                                  listed(twice, kNamesListed), file.path().string()));
 }
 
 std::vector<std::string> NetcdfFiles::paths() const {

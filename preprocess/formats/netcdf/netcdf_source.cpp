@@ -14,19 +14,12 @@
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr size_t kNamesListed = 3;
-
-std::string listed(const std::vector<std::string>& names) {
-  const size_t count = std::min(kNamesListed, names.size());
-  std::string text =
-      fmt::format("{}", fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(count), ", "));
-  if (names.size() > count) text += fmt::format(" and {} more", names.size() - count);
-  return text;
-}
 
 std::string describeDimensions(const NetcdfFiles& file, const CfGrid& grid) {
   const auto name = [&](size_t axis) { return file.dimensions()[grid.dims.axes[axis]].name; };
@@ -140,15 +133,15 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     if (!file.groups().empty() && std::filesystem::is_directory(file.path()))
       why =
           fmt::format("its arrays are in groups ({}), each of which is a store: give the folder of one ({})",
-                      listed(file.groups()), (file.path() / file.groups().front()).string());
+                      listed(file.groups(), kNamesListed), (file.path() / file.groups().front()).string());
     else if (!file.groups().empty())
       why = fmt::format(
           "its variables are in groups ({}), which are not read: write a group to a file of its own (ncks -G "
           ": -g {} {} OUT)",
-          listed(file.groups()), file.groups().front(), file.path().filename().string());
+          listed(file.groups(), kNamesListed), file.groups().front(), file.path().filename().string());
     if (!found.left_out.empty()) {
       const auto reasons = byReason(found.left_out);
-      why = fmt::format("{}: {}", listed(reasons.begin()->second), reasons.begin()->first);
+      why = fmt::format("{}: {}", listed(reasons.begin()->second, kNamesListed), reasons.begin()->first);
     }
     throw Error("{}: has no grid by the CF conventions: {}", file.path().string(), why);
   }
@@ -186,11 +179,12 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     if (where == listDimensions(file, found.grids[chosen]))
       where += fmt::format(" at {}, {}", found.grids[g].longitude.variable().name,
                            found.grids[g].latitude.variable().name);
-    description.warnings.push_back(fmt::format(
-        "left out: {}, on another grid ({}); select that grid with --scalar NAME", listed(names), where));
+    description.warnings.push_back(
+        fmt::format("left out: {}, on another grid ({}); select that grid with --scalar NAME",
+                    listed(names, kNamesListed), where));
   }
   for (const auto& [reason, names] : byReason(found.left_out))
-    description.warnings.push_back(fmt::format("left out: {}: {}", listed(names), reason));
+    description.warnings.push_back(fmt::format("left out: {}: {}", listed(names, kNamesListed), reason));
   return std::move(found.grids[chosen]);
 }
 

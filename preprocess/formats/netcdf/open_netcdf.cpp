@@ -16,6 +16,7 @@
 #include "preprocess/formats/netcdf/joined_faces.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 
 namespace curvisplat {
 namespace {
@@ -57,7 +58,7 @@ bool sameNames(const std::vector<GridScalar>& a, const std::vector<GridScalar>& 
 std::string namesOf(const std::vector<GridScalar>& scalars) {
   std::vector<std::string> names;
   for (const GridScalar& scalar : scalars) names.push_back(scalar.name);
-  return fmt::format("{}", fmt::join(names, ", "));
+  return listed(names);
 }
 
 /// The options of each tile with its files alone; empty if the files are not of several tiles. Files whose

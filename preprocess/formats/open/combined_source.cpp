@@ -10,6 +10,7 @@
 #include "preprocess/formats/exodus/exodus_names.h"
 #include "preprocess/formats/gmsh/gmsh_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 
 namespace curvisplat {
 namespace {
@@ -117,8 +118,7 @@ void CombinedSource::describe(const std::vector<std::string>& names) {
       }
     }
   if (!partial.empty())
-    description_.warnings.push_back(
-        fmt::format("left out: {}: not in all of the files", fmt::join(partial, ", ")));
+    description_.warnings.push_back(fmt::format("left out: {}: not in all of the files", listed(partial)));
   for (const Group& group : groups_) {
     std::vector<Place>& places = places_.emplace_back();
     for (const GridScalar& scalar : description_.scalars)

@@ -41,6 +41,7 @@
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/name_list.h"
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 
@@ -153,14 +154,13 @@ std::string sourceOfScalars(const GridDescription& description) {
 }
 
 std::string namesIn(const GridDescription& description) {
-  std::string names = "available: ";
-  for (size_t n = 0; n < description.scalars.size(); ++n) {
-    const GridScalar& scalar = description.scalars[n];
-    names += (n ? ", " : "") + scalar.name;
+  std::vector<std::string> names;
+  for (const GridScalar& scalar : description.scalars) {
     const uint32_t number = numberOf(scalar);
-    if (number > 0 && scalar.name != std::to_string(number)) names += " (" + std::to_string(number) + ")";
+    const bool has_number = number > 0 && scalar.name != std::to_string(number);
+    names.push_back(has_number ? fmt::format("{} ({})", scalar.name, number) : scalar.name);
   }
-  return names;
+  return "available: " + listed(names);
 }
 
 // ---- opening ----

@@ -16,6 +16,7 @@
 #include "preprocess/formats/su2/su2_source.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/name_list.h"
 
 namespace curvisplat {
 namespace {
@@ -267,7 +268,7 @@ std::string noteOnLaterScalars(const GridDescription& first, const OpenGridOptio
   if (others.empty()) return "";
   return fmt::format(
       "the last step has {}, which the first one lacks: begin at a step that has {} (--steps FIRST:LAST)",
-      fmt::join(others, ", "), others.size() == 1 ? "it" : "them");
+      listed(others), others.size() == 1 ? "it" : "them");
 }
 
 }  // namespace curvisplat

@@ -22,6 +22,7 @@
 #include "preprocess/formats/openfoam/foam_file.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 
 namespace curvisplat {
 namespace {
@@ -168,10 +169,9 @@ void FoamSource::chooseRegions(const std::string& asked) {
             : fmt::format("{} gives one of them", (of.folder / "constant" / regions.front()).string());
     if (whole)
       description_.warnings.push_back(fmt::format(
-          "the regions {} have meshes of their own, which are not read: {}", fmt::join(regions, ", "), how));
+          "the regions {} have meshes of their own, which are not read: {}", listed(regions), how));
     else if (asked.empty() && regions.size() > 1)
-      description_.notes.push_back(
-          fmt::format("the regions {} are read together: {}", fmt::join(regions, ", "), how));
+      description_.notes.push_back(fmt::format("the regions {} are read together: {}", listed(regions), how));
   }
 }
 
@@ -307,7 +307,7 @@ void FoamSource::warnOfLaterFields() {
   for (const auto& [step, names] : later)
     description_.warnings.push_back(fmt::format(
         "{} {} read from time {} on, not at time {}: --time-step {}, or --steps {}:{} for a series",
-        fmt::join(names, ", "), names.size() == 1 ? "is" : "are", time_names_[step],
+        listed(names), names.size() == 1 ? "is" : "are", time_names_[step],
         time_names_[description_.time_step], step, step, time_names_.size() - 1));
 }
 

@@ -21,6 +21,7 @@
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/su2/su2_mesh.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -241,7 +242,7 @@ Su2Source::Su2Source(const OpenGridOptions& options) {
     description_.pieces.push_back({fmt::format("zone {}", n + 1), file->name(), mesh.points(), mesh.cells()});
     markers.insert(markers.end(), zones_[n].markers.begin(), zones_[n].markers.end());
   }
-  if (!markers.empty()) description_.notes.push_back(fmt::format("boundaries: {}", fmt::join(markers, ", ")));
+  if (!markers.empty()) description_.notes.push_back("boundaries: " + listed(markers));
   openRestarts(options);
 }
 

@@ -15,6 +15,7 @@
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -109,9 +110,9 @@ class Collector {
     if (curves_.points.empty())
       fail(as_points_ ? "has no points" : "has no lines; --points draws the points of a file");
     if (!scalar_.empty() && !found_)
-      fail(fmt::format("has no scalar '{}'{}; {}", scalar_,
-                       didYouMean(scalar_, std::vector(names_.begin(), names_.end())),
-                       names_.empty() ? "it has none" : fmt::format("it has {}", fmt::join(names_, ", "))));
+      fail(fmt::format(
+          "has no scalar '{}'{}; {}", scalar_, didYouMean(scalar_, std::vector(names_.begin(), names_.end())),
+          names_.empty() ? "it has none" : "it has " + listed(std::vector(names_.begin(), names_.end()))));
     return std::move(curves_);
   }
 
