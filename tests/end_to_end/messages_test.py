@@ -376,6 +376,23 @@ class Messages(FormatCase):
         self.assertEqual(refused.returncode, 1, refused.stderr)
         self.assertIn("v38, v39 and 960 more", refused.stderr)
 
+    def test_reports_replace_files_of_json_alone(self):
+        self.run_program("generate", "wake", "--size", "5x4x3", "-o", self.folder / "w")
+        grid, report = self.folder / "w.xyz", self.folder / "report.json"
+        before = grid.read_bytes()
+        cache = ["convert", grid, self.folder / "w.fun", "--overwrite", "-o", self.folder / "w.splats"]
+        self.assertEqual(self.run_program(*cache).returncode, 0)
+        for command in (["render", self.folder / "w.splats", "-o", self.folder / "w.png", "--size", "16x12"],
+                        ["convert", self.folder / "w.splats", "--add-scalar", "i"]):
+            for option in ("--stats", "--trace"):
+                refused = self.run_program(*command, option, grid)
+                self.assertEqual(refused.returncode, 1, refused.stderr)
+                self.assertRegex(refused.stderr, f"^curvisplat: {option} .*w.xyz: exists and is not a JSON file; choose another name")
+                self.assertEqual(grid.read_bytes(), before)
+        for _ in range(2):
+            for option in ("--stats", "--trace"):
+                self.assertEqual(self.run_program(*cache, option, report).returncode, 0)
+
     def test_thousands_of_tetrahedra_on_one_another_are_converted(self):
         zone = "ZONE N=4, E=1, ZONETYPE=FETETRAHEDRON, DATAPACKING=POINT\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n1 2 3 4\n"
         path = self.write("many.dat", 'VARIABLES="x" "y" "z" "p"\n' + zone * 13000)

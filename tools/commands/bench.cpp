@@ -75,7 +75,7 @@ void checkArguments(const BenchArguments& arguments) {
     throw UsageError("a CACHE is required, or --convert to measure a conversion");
   if (!arguments.converts && (arguments.nodes || !arguments.temporary_folder.empty()))
     throw UsageError("{} needs --convert", arguments.nodes ? "--nodes" : "--tmp");
-  if (!arguments.json.empty()) checkOutputFile("--json", arguments.json, {arguments.cache});
+  if (!arguments.json.empty()) checkJsonOutput("--json", arguments.json, {arguments.cache});
   if (arguments.plots.empty()) return;
   requirePlots();
   std::error_code ignored;

@@ -111,7 +111,7 @@ void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
     checkOutputFile("--first-image", arguments.first_image, others);
   }
   others.insert(others.end(), {arguments.output, arguments.first_image});
-  if (!arguments.statistics.empty()) checkOutputFile("--stats", arguments.statistics, others);
+  if (!arguments.statistics.empty()) checkJsonOutput("--stats", arguments.statistics, others);
 }
 
 void takeFilm(RenderArguments& arguments) {

@@ -25,6 +25,7 @@
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/survey/cell_bends.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/progress.h"
 #include "stream/cache/series.h"
 #include "tools/options/grid_surfaces.h"
@@ -160,23 +161,13 @@ std::vector<std::string> splitAtCommas(const std::string& text) {
   return parts;
 }
 
-/// The first of very many names.
-std::string someOf(const std::vector<std::string>& names) {
-  constexpr size_t kListed = 40;
-  const size_t count = names.size() > kListed + 1 ? kListed : names.size();
-  std::string text =
-      fmt::format("{}", fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(count), ", "));
-  if (count < names.size()) text += fmt::format(" and {} more", names.size() - count);
-  return text;
-}
-
 /// Scalars that are not converted unasked, by the reason.
 struct LeftOut {
   std::vector<std::string> other_centring, others;
 
   void printNotes(Centring centring) const {
     const auto print = [](const std::vector<std::string>& names, const std::string& why) {
-      if (!names.empty()) printMessage("note: left out: {}{} --scalar NAME,NAME", someOf(names), why);
+      if (!names.empty()) printMessage("note: left out: {}{} --scalar NAME,NAME", listed(names), why);
     };
     const bool cells = centring == Centring::kCell;
     print(other_centring,
@@ -364,7 +355,7 @@ std::vector<std::filesystem::path> gridAndCaches(const ConvertArguments& argumen
 
 void checkStatisticsFile(const ConvertArguments& arguments) {
   if (!arguments.statistics.empty())
-    checkOutputFile("--stats", arguments.statistics, gridAndCaches(arguments));
+    checkJsonOutput("--stats", arguments.statistics, gridAndCaches(arguments));
 }
 
 void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options) {

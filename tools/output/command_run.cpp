@@ -100,7 +100,7 @@ void runTraced(const std::filesystem::path& path, const std::vector<std::filesys
   if (!ranks.alone())
     own.replace_filename(
         fmt::format("{}.{}{}", path.stem().string(), ranks.rank(), path.extension().string()));
-  checkOutputFile("--trace", own, others);
+  checkJsonOutput("--trace", own, others);
   const auto endQuietly = [] {
     try {
       Trace::end();

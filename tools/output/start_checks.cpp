@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <new>
 #include <string>
 #include <system_error>
@@ -61,6 +62,16 @@ void checkOutputFile(std::string_view option, const std::filesystem::path& path,
         fs::equivalent(target.parent_path(), there, ignored))
       throw Error("{} {}: would overwrite {}; choose another name", option, path.string(), other.string());
   }
+}
+
+void checkJsonOutput(std::string_view option, const std::filesystem::path& path,
+                     const std::vector<std::filesystem::path>& others) {
+  checkOutputFile(option, path, others);
+  std::ifstream existing(path, std::ios::binary);
+  char first = 0;
+  if (existing >> first && first != '{' && first != '[')
+    throw Error("{} {}: exists and is not a JSON file; choose another name, or remove it first", option,
+                path.string());
 }
 
 namespace {

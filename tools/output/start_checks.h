@@ -24,6 +24,11 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,
                      const std::vector<std::filesystem::path>& others);
 
+/// Calls checkOutputFile() for a file of JSON, which may have any name: also throws Error if `path` exists and holds
+/// anything else, such as a grid.
+void checkJsonOutput(std::string_view option, const std::filesystem::path& path,
+                     const std::vector<std::filesystem::path>& others);
+
 /// Throws Error if this process cannot now have the threads of a command with `--threads count` (0: one per
 /// core), or if memory is too small for them to begin. `option`: the option's name in the message. Starts
 /// and ends all of them, but at most 68.
