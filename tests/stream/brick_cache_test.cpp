@@ -262,6 +262,14 @@ TEST_F(UringReads, AreNotUsedWhereReadsCannotBeSubmitted) {
   EXPECT_EQ(inProcess(run), kGood);
 }
 
+TEST_F(UringReads, AreNotUsedUnderValgrind) {
+  const auto run = []() -> int {
+    ::setenv("LD_PRELOAD", "/usr/libexec/valgrind/vgpreload_core-amd64-linux.so", 1);
+    return makeUringReads(4) ? kBad : kGood;
+  };
+  EXPECT_EQ(inProcess(run), kGood);
+}
+
 TEST_F(UringReads, EndWithAnErrorIfTheirThreadCannotBeWoken) {
   if (kHasThreadSanitizer) GTEST_SKIP() << "the forked process starts a thread";
   const auto run = []() -> int {
