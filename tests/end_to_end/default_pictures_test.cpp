@@ -193,6 +193,11 @@ TEST_F(DefaultPictures, PoorPicturesAreAnsweredWithAnOption) {
       run({"render", file("a.splats"), "-o", file("f.png"), "--size", "800x800", "--tf", "grey", "--range",
            "100,200", "--opacity", "0:1,1:1", "--opacity-unit", "1e-4"});
   expectSays(flat.err, "of one colour; leave out --tf, --range, --opacity and --opacity-unit");
+  const ProgramResult dark =
+      run({"render", file("a.splats"), "-o", file("f.png"), "--size", "400x400", "--tf", "grey", "--range",
+           "100,200", "--opacity", "0:1,1:1", "--opacity-unit", "1e-4", "--ambient-occlusion", "1"});
+  expectSays(dark.err, "the picture is dark or of one colour");
+  expectSays(dark.err, "--ambient-occlusion");
 }
 
 const Words kStep = {"--opacity", "0:0,0.499:0,0.501:0.9,1:0.9"};

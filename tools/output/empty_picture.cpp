@@ -193,6 +193,9 @@ std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
       blank ? fmt::format("nearly blank: {:.2g} % of its pixels differ visibly from the background",
                           100 * contrast.seen)
             : "of one colour";
+  if (!blank && scene.options.light && scene.options.light->hasShadows())
+    return "the picture is dark or of one colour: the volume shadows itself; lower --shadow and "
+           "--ambient-occlusion, or choose a larger --opacity-unit";
   if (!function_options.empty())
     return fmt::format("the picture is {}; leave out {} to have colours and opacities chosen from the data{}",
                        what, function_options, blank ? ", or look from elsewhere (--view iso)" : "");

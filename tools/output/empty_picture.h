@@ -30,7 +30,7 @@ struct RenderedScene {
 /// The reasons for an empty picture, most likely first; at least one.
 std::vector<std::string> whyEmpty(const RenderedScene& scene);
 
-/// A warning if the picture is nearly blank or of one colour, with the option that helps; else empty.
+/// A warning if the picture is nearly blank, of one colour, or dark by shadows, with the option that helps; else empty.
 /// `function_options`: those of --tf, --range, --opacity, --asinh and --opacity-unit that were given, for
 /// people to read.
 std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
