@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 """option_pairs_test.py RUN_BY_FORK
 
-Pairs of options, with plausible and absurd values, of each command: status 0, or 1 or 2 with one line, which names an option or
-its value where the usage is wrong; no signal, no hang, nothing left behind but the file that an option names. A sample; all
-pairs with CURVISPLAT_WHOLE. view, serve and bench have no display or no cache, so that they only read their options.
+Pairs of options, with plausible and absurd values and those at the edges of what an option takes, of each command: status 0, or 1 or
+2 with one line, which names an option or its value where the usage is wrong; no signal, no hang, nothing left behind but the file that
+an option names. A sample; all pairs with CURVISPLAT_WHOLE. view, serve and bench have no display or no cache, so that they only read
+their options.
 """
 import itertools
 import os
@@ -19,6 +20,35 @@ program = str(pathlib.Path(sys.argv.pop(1)).resolve())
 SAMPLE = 40  # runs of each command
 ABSURD = ["", "-1", "0", "nan", "1e308", "999999999999999999999", "a", "1,2", "\x1b[2J", "-", "1:1", "../x", "x" * 300]
 PLAUSIBLE = ["1", "2", "0.5", "0,0,0", "30x20", "128M", "p", "auto", "x", "0:1", "1,0,0,0", "off", "red"]
+NUMBERS = ["0", "-1", "nan", "-inf", "1e308", "1e-308", "5e-324", "90", "89.9999999", "360", "0x10", "1,", " 1", "+1", "1e"]
+COUNTS = ["0", "1", "1024", "1025", "4294967296", "18446744073709551615", "18446744073709551616", "-1", "1.5"]
+VECTORS = ["0,0,0", "1,1,1", "0,0,-1", "1e308,1e308,1e308", "1e-300,0,0", "nan,0,0", "1,2", "1,2,3,4", "1,,1"]
+PLANES = ["0,0,0,1,0,0", "0,0,0,0,0,0", "1e300,0,0,1,0,0", "0,0,0,1e-200,0,0", "0,0,0,1e200,1e200,0", "nan,0,0,1,0,0", "1,2,3"]
+OPACITIES = ["0", "0.5", "2", "nan", "function", "function*2", "function*", "function*nan", "function*-1", "function*1e300"]
+CURVES = ["0:0,1:1", "0:0", "1:1,0:0", "0.5:0.5", "ramp", "0:2", "-1:0,2:1", "nan:0", "0:nan", "0:0,,1:1", ",".join(f"{n / 5000}:{n % 2}" for n in range(5000))]
+RANGES = ["0,1", "1,0", "1,1", "1%,99%", "99%,1%", "50%,50%", "-1%,101%", "nan,1", "-inf,inf", "1e308,-1e308", "-1e308,1e308", "0,1e-320", "1%,2", "1%"]
+MEMORY = ["0", "1", "1M", "64M", "1T", "999999999999T", "1.5G", "-1M", "5Q", "18446744073709551616", "K", "nanM"]
+COLOURS = ["#ff0000", "#FFF", "#gggggg", "#", "#ff00000", "white", "transparent"]
+LENGTHS = ["3px", "0.02", "0px", "-1px", "1e30px", "nanpx", "1e300", "px", "1e-300", "1000px"]
+TITLES = ["{time}", "{", "{time:.99999f}", "{time:999999d}", "{time:{time}}", "{step:n}", "{nosuch}", "x" * 5000, "\n\n", "{scalar:>1000000000}"]
+FACES = ["kmin", "kmin,kmax", "block 1:k=min", "block 0:k=min", "block 99:k=min", "block 1:k=-1", "block 1:k=99999999999", "k=2", "block", "g.xyz"]
+EDGES = {  # values at the edges of what an option takes, by its name
+    "--size": ["1x1", "0x0", "1x16384", "65536x1", "-1x5", "12x", "3e1x4", "99999999999x99999999999"], "--range": RANGES, "--opacity-range": RANGES,
+    "--tf": ["viridis_r_r", "_r", "VIRIDIS", "g.xyz", "a.splats", "/dev/null"], "--opacity": CURVES, "--gradient-opacity": CURVES,
+    "--asinh": ["0,1", "0,0", "0,-1", "1e308,1e308", "0,1e-320", "0,inf"], "--opacity-asinh": ["0,1", "0,-1", "nan,1"], "--max-splats": [*COUNTS, "8M"],
+    "--scale": VECTORS, "--position": VECTORS, "--focal-point": VECTORS, "--view-up": VECTORS, "--light-direction": VECTORS, "--clip-plane": PLANES,
+    "--slice": PLANES, "--clip-box": ["1,0,0,1,0,1", "0,0,0,0,0,0", "nan,1,0,1,0,1", "-1e308,1e308,-1e308,1e308,-1e308,1e308", "0,1,0,1"],
+    "--light": ["0.3,0.7,0.25", "2,0,0", "-1,0,0", "nan,0,0", "1,1"], "--look-at": ["0,0", "nan,0", "0,91", "1e308,0", "180,-90", "0"],
+    "--shadow": NUMBERS, "--ambient-occlusion": NUMBERS, "--from-height": NUMBERS, "--lines-time": ["past", "all", "-1", "nan", "1e308", "1e308 days"],
+    "--globe": ["off", "1", "nan", "-1", "1e308"], "--background": COLOURS, "--surface-colour": COLOURS, "--lines-colour": COLOURS,
+    "--surface-opacity": OPACITIES, "--slice-opacity": OPACITIES, "--iso-opacity": OPACITIES, "--lines-opacity": OPACITIES, "--title": TITLES, "--label": TITLES,
+    "--iso": ["0.5", "0,1,2", "nan", "1e308", ",".join(str(n / 1000) for n in range(1000)), ",", "0.5,", "-1e-320"], "--surface": FACES,
+    "--line-width": LENGTHS, "--point-size": LENGTHS, "--steps": ["0:1", "2:0", "0:99", "0:2:0", ":", "0:", "0:2:99999999999999999999", "all:2"],
+    "--path": ["none.json", "/dev/null", "g.xyz", "."], "--frames": COUNTS[:-2], "--frame-rate": [*NUMBERS, "24000/1001"], "--orbit": NUMBERS, "--zoom": NUMBERS,
+    "--part": ["1/1", "0/2", "3/2", "1/0", "1/99999999999", "-1/2", "1", "/", "1/4294967296"], "--memory": MEMORY, "--card-memory": MEMORY,
+    "--viewer-memory": MEMORY, "--threads": COUNTS, "--refine": ["1", "4", "auto", "0", "9", "1000000", "nan", "4294967297"], "--step": COUNTS,
+    "--tmp": [".", "/nonexistent", "g.xyz", "/proc"], "--time-step": COUNTS, "--select": ["month=3", "=", "a=", "=3", "month=nan"], "--until": COUNTS,
+    "--probe": [*VECTORS, "g.xyz", "/dev/null"], "--voxels": [*COUNTS, "100000"], "--channels": ["depth,depth", "none,depth", ",", "rgb"], "--port": COUNTS}
 LEFT_OUT = {"--help", "--help-all", "--version", "--follow", "--output", "-o"}
 TO_FILES = {"--stats", "--trace", "--write-tf", "--json", "--plot"}  # write what their values name
 
@@ -40,6 +70,11 @@ class OptionPairs(unittest.TestCase):
             done = run(cls.folder, *command)
             assert done.returncode == 0, done.stderr
 
+    @staticmethod
+    def value(chosen, name):
+        kind = chosen.random()
+        return chosen.choice(ABSURD if kind < 0.3 else PLAUSIBLE if kind < 0.6 or name not in EDGES else EDGES[name])
+
     def try_all(self, command, *inputs, otherwise=None, output=None):
         """`otherwise`: options and their values, unless they are in a pair."""
         names = [(name, bool(value)) for name, value in
@@ -48,7 +83,7 @@ class OptionPairs(unittest.TestCase):
         self.assertGreater(len(names), 2, command)
         chosen = random.Random(command)
         pairs = list(itertools.combinations(names, 2))
-        cases = [(pair, [chosen.choice(ABSURD if chosen.random() < 0.5 else PLAUSIBLE) for _ in pair]) for pair in pairs]
+        cases = [(pair, [self.value(chosen, name) for name, _ in pair]) for pair in pairs]
         if "CURVISPLAT_WHOLE" not in os.environ:
             cases = chosen.sample(cases, min(SAMPLE, len(cases)))
         before = set(self.folder.iterdir())
@@ -72,7 +107,7 @@ class OptionPairs(unittest.TestCase):
             # Even of a run that fails. After "--trace=" the next word is the value.
             asked = [path for (name, _), value in zip(pair, values) if name in TO_FILES for path in ([value] if value else words + target)]
             if output is not None and done.returncode == 0:
-                asked.append(output)
+                asked += [output, f"{output}.parts"]  # with --part
             new = left - {(self.folder / path).parent.resolve() / pathlib.Path(path).name for path in asked}
             self.assertEqual({path.name for path in new}, set(), told)
             for path in left:
