@@ -269,7 +269,8 @@ CurveSet parseCurveText(std::string_view text, const std::filesystem::path& path
     }
     if (columns->geographic) {
       if (std::abs(point.x) > kMaxLongitude || std::abs(point.y) > kMaxLatitude)
-        rows.fail("found longitude {:g} and latitude {:g}; expected degrees", point.x, point.y);
+        rows.fail("found longitude {} and latitude {}; expected degrees", numberText(point.x),
+                  numberText(point.y));
       if (std::abs(point.z) > kMaxMetres) rows.fail("found {:g} for height; expected metres", point.z);
       point = globe->placeAt({point.x, point.y, columns->kilometres * point.z});
     }

@@ -13,6 +13,7 @@
 #include "render/mesh/curve_set.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 
@@ -43,8 +44,11 @@ class MapLines {
 
   /// `at`: degrees east and north, metres of height.
   void add(const glm::dvec3& at) {
-    if (!(std::abs(at.x) <= kMaxLongitude && std::abs(at.y) <= kMaxLatitude && std::abs(at.z) <= kMaxMetres))
-      throw Error("{}: found longitude {:g} and latitude {:g}; expected degrees", path_.string(), at.x, at.y);
+    if (!(std::abs(at.x) <= kMaxLongitude && std::abs(at.y) <= kMaxLatitude))
+      throw Error("{}: found longitude {} and latitude {}; expected degrees", path_.string(),
+                  numberText(at.x), numberText(at.y));
+    if (!(std::abs(at.z) <= kMaxMetres))
+      throw Error("{}: found {} for height; expected metres", path_.string(), numberText(at.z));
     if (before_) {
       const double degrees = std::max(std::abs(at.x - before_->x), std::abs(at.y - before_->y));
       const int pieces = std::max(1, static_cast<int>(std::ceil(degrees / kLongest)));

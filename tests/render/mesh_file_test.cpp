@@ -305,6 +305,8 @@ TEST(MapLines, GeoJsonHasLinesEdgesAndPoints) {
              "a.geojson: type is invalid (found \"Circle\", expected a type of GeoJSON)");
   expectSays(refusal(R"({"type": "Point", "coordinates": [1]})"), "expected a longitude and a latitude");
   expectSays(refusal(R"({"type": "Point", "coordinates": [1, 5000000]})"), "expected degrees");
+  expectSays(refusal(R"({"type": "Point", "coordinates": [1, 5, 1e300]})"),
+             "found 1e+300 for height; expected metres");
   expectSays(refusal(R"({"type": "FeatureCollection", "features": []})"), "has no lines, polygons or points");
   expectSays(refusal("{"), "a.geojson: ");
 }
@@ -339,6 +341,10 @@ TEST(MapLines, ShapefilesHavePartsOfLines) {
   };
   EXPECT_EQ(refusal("PK"), "a.shp: is not a shapefile");
   EXPECT_EQ(refusal(shapefile(7)), "a.shp: has shapes of type 7; expected lines, polygons or points");
+  std::string no_number = shapefile(3);
+  no_number.replace(no_number.size() - 16, 8,
+                    std::string("\0\0\0\0\0\0\xf8\xff", 8));  // a NaN whose sign bit is set
+  expectSays(refusal(no_number), "found longitude NaN and latitude 20");
   std::string whole = shapefile(3);
   for (size_t size = 100; size < whole.size(); ++size)
     if (size != 112) expectSays(refusal(whole.substr(0, size)), "a.shp: ");

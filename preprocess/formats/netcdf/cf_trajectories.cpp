@@ -251,8 +251,8 @@ class TrajectoryReader {
       while (left == 0 && line < counts.size()) {
         const double count = counts[line++];
         if (!(count >= 0 && count <= static_cast<double>(along)))
-          fail(fmt::format("{} is {:g} for a trajectory; expected up to {} observations", counts_->name,
-                           count, along));
+          fail(fmt::format("{} is {} for a trajectory; expected up to {} observations", counts_->name,
+                           numberText(count), along));
         left = static_cast<size_t>(count);
       }
       return left > 0;
