@@ -15,6 +15,13 @@ trap 'rm -rf "$folder"' EXIT
 quietly() { "$@" > "$folder/log" 2>&1 || { cat "$folder/log"; echo "FAILED: $*"; exit 1; }; }
 expect() { "${@:2}" || { echo "FAILED: $1"; exit 1; }; }
 
+# refused TEXT ARGUMENT ...: bundle.sh says TEXT, and writes nothing
+refused() {
+  ! "$root/tools/packaging/bundle.sh" "${@:2}" "$folder/none" > "$folder/log" 2>&1 && grep -q "$1" "$folder/log" && [[ ! -e $folder/none ]]
+}
+expect "a folder without a build is refused" refused "is not a build folder" "$folder"
+expect "an example that does not exist is refused" refused "needs a file that exists" --example "$folder/example" "$build"
+
 wheel=$(grep -q '^CURVISPLAT_PYTHON:BOOL=ON' "$build/CMakeCache.txt" && echo --wheel || true)
 quietly "$root/tools/packaging/bundle.sh" --fast $wheel --example "$root/tests/data/cgns/flow.cgns" "$build" "$folder/out"
 version=$("$build/tools/curvisplat" --version)

@@ -17,7 +17,9 @@ while [[ ${1:-} == --* ]]; do
   case $1 in
     --wheel) wheel=yes ;;
     --fast) fast=yes ;;
-    --example) examples+=("$2") && shift ;;
+    --example)
+      [[ -f ${2:-} ]] || { echo "bundle: --example needs a file that exists (found '${2:-}')" >&2 && exit 2; }
+      examples+=("$2") && shift ;;
     *) echo "bundle: unknown option $1" >&2 && exit 2 ;;
   esac
   shift
@@ -26,6 +28,7 @@ done
 for tool in patchelf zstd strip nm cc; do
   command -v $tool > /dev/null || { echo "bundle: $tool not found; apt-get install patchelf zstd binutils gcc" >&2 && exit 1; }
 done
+[[ -f $1/CMakeCache.txt ]] || { echo "bundle: $1 is not a build folder; build first: tools/build.sh curvisplat" >&2 && exit 2; }
 build=$(realpath "$1")
 mkdir -p "$2"
 out=$(realpath "$2")
