@@ -77,23 +77,31 @@ void GradientPercentiles::set(const std::vector<float>& magnitudes, const std::v
   magnitudes_[kIntervals] = magnitudes[order.back()];
 }
 
+double GradientPercentiles::magnitudeAt(double share) const {
+  const double at = share * kIntervals;
+  const auto n = std::min(static_cast<size_t>(at), kIntervals - 1);
+  return magnitudes_[n] + (at - static_cast<double>(n)) * (magnitudes_[n + 1] - magnitudes_[n]);
+}
+
+double GradientPercentiles::shareBelow(double magnitude) const {
+  const auto found = std::lower_bound(magnitudes_.begin(), magnitudes_.end(), magnitude);
+  if (found == magnitudes_.begin()) return 0;
+  if (found == magnitudes_.end()) return 1;
+  const double below = found[-1], part = (magnitude - below) / (*found - below);
+  return (static_cast<double>(found - magnitudes_.begin()) - 1 + part) / kIntervals;
+}
+
 GradientOpacity::GradientOpacity(std::span<const OpacityPoint> points,
                                  const GradientPercentiles& percentiles) {
   const OpacityCurve curve(points);
-  const auto steep = percentiles.magnitudes();
-  constexpr auto kIntervals = static_cast<double>(GradientPercentiles::kIntervals);
-  const auto magnitudeAt = [&](double share) {
-    const auto n = std::min(static_cast<size_t>(share * kIntervals), GradientPercentiles::kIntervals - 1);
-    const double part = share * kIntervals - static_cast<double>(n);
-    return static_cast<float>(steep[n] + part * (steep[n + 1] - steep[n]));
-  };
   std::vector<double> shares;
-  for (size_t n = 0; n < steep.size(); ++n) shares.push_back(static_cast<double>(n) / kIntervals);
+  for (size_t n = 0; n <= GradientPercentiles::kIntervals; ++n)
+    shares.push_back(static_cast<double>(n) / GradientPercentiles::kIntervals);
   for (const OpacityPoint& point : points) shares.push_back(point.x);
   std::sort(shares.begin(), shares.end());
   shares.erase(std::unique(shares.begin(), shares.end()), shares.end());
   for (const double share : shares) {
-    magnitudes_.push_back(magnitudeAt(share));
+    magnitudes_.push_back(static_cast<float>(percentiles.magnitudeAt(share)));
     factors_.push_back(static_cast<float>(curve.at(share)));
     const auto jump = std::find_if(points.rbegin(), points.rend(),
                                    [&](const OpacityPoint& point) { return point.x == share; });

@@ -37,6 +37,10 @@ class GradientPercentiles {
 
   /// [kIntervals + 1]: n / kIntervals of the volume is less steep. All 0 without data.
   std::span<const float> magnitudes() const { return magnitudes_; }
+  /// The magnitude that the share `share` (0 to 1) of the volume is less steep than.
+  double magnitudeAt(double share) const;
+  /// The share of the volume that is less steep; the lowest where percentiles are equal.
+  double shareBelow(double magnitude) const;
 
  private:
   void set(const std::vector<float>& magnitudes, const std::vector<float>& volumes);

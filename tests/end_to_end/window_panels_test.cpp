@@ -1,5 +1,6 @@
 // Panels and menus of the window: values and markers, planes in the picture, two scalars, undo, saved views,
 // messages, keys.
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <regex>
@@ -135,6 +136,33 @@ TEST_F(WindowPanels, EscapeClosesListsAndMenus) {
   widget("item Open...");
   press("Escape");
   EXPECT_TRUE(gone("item Open..."));
+  close();
+}
+
+TEST_F(WindowPanels, TheGradientsHistogramSaysMagnitudesAndShares) {
+  open();
+  save();  // it hears
+  click("gradient opacity");
+  const auto under = [&](double across) {
+    moveTo(placeOf("gradient histogram", across));
+    const std::string before = hasWidget("gradient of ") ? widget("gradient of ") : "";
+    EXPECT_TRUE(eventually([&] { return hasWidget("gradient of ") && widget("gradient of ") != before; }));
+    const std::string text = widget("gradient of ");
+    std::smatch parts;
+    EXPECT_TRUE(std::regex_match(
+        text, parts,
+        std::regex("gradient of (\\S+) per length: (\\S+) % of the volume is less steep; opacity x (\\S+)")))
+        << text;
+    return parts.size() == 4 ? std::array{std::stod(parts[1]), std::stod(parts[2]), std::stod(parts[3])}
+                             : std::array<double, 3>{};
+  };
+  const auto gentle = under(0.1), steep = under(0.98);
+  EXPECT_GT(gentle[0], 0);
+  EXPECT_GT(steep[0], 2 * gentle[0]);
+  EXPECT_LT(gentle[1], 50);
+  EXPECT_GT(steep[1], 80);
+  EXPECT_EQ(gentle[2], 0);  // it rises from 50 to 80 %
+  EXPECT_EQ(steep[2], 1);
   close();
 }
 

@@ -29,29 +29,38 @@ double opacityAt(float height) {
   return static_cast<double>(height) * static_cast<double>(height);
 }
 
-void paintCurve(const EditedFunction& function, const std::vector<double>& histogram,
-                std::span<const double> marked, const CurveCanvas& canvas) {
+void paintHistogram(const std::vector<double>& histogram, const CurveCanvas& canvas) {
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const ImVec2 end(canvas.lower.x + canvas.size.x, canvas.lower.y + canvas.size.y);
   list->AddRectFilled(canvas.lower, end, IM_COL32(30, 30, 34, 255));
   const double most = histogram.empty() ? 0 : *std::max_element(histogram.begin(), histogram.end());
   for (size_t n = 0; most > 0 && n < histogram.size(); ++n) {
-    // Logarithmic over four decades, so that thin layers stay visible beside the far field.
     const double part = std::clamp(1 + std::log10(std::max(histogram[n] / most, 1e-9)) / 4, 0.0, 1.0);
     const double x = static_cast<double>(n) / static_cast<double>(histogram.size());
     list->AddRectFilled(canvas.at(x, static_cast<float>(part)),
                         canvas.at(x + 1.0 / static_cast<double>(histogram.size()), 0),
                         IM_COL32(96, 104, 120, 255));
   }
-  const float unit = ImGui::GetFontSize();
-  const OpacityCurve curve(function.points());
-  ImVec2 before = canvas.at(0, heightOf(curve.at(0)));
+}
+
+void paintLine(const CurveCanvas& canvas, const std::function<float(double)>& height) {
+  ImVec2 before = canvas.at(0, height(0));
   for (float x = 1; x <= canvas.size.x; ++x) {
     const double part = x / canvas.size.x;
-    const ImVec2 now = canvas.at(part, heightOf(curve.at(part)));
-    list->AddLine(before, now, IM_COL32(250, 250, 250, 255), 0.11f * unit);
+    const ImVec2 now = canvas.at(part, height(part));
+    ImGui::GetWindowDrawList()->AddLine(before, now, IM_COL32(250, 250, 250, 255),
+                                        0.11f * ImGui::GetFontSize());
     before = now;
   }
+}
+
+void paintCurve(const EditedFunction& function, const std::vector<double>& histogram,
+                std::span<const double> marked, const CurveCanvas& canvas) {
+  paintHistogram(histogram, canvas);
+  const OpacityCurve curve(function.points());
+  paintLine(canvas, [&](double x) { return heightOf(curve.at(x)); });
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const float unit = ImGui::GetFontSize();
   const auto [low, high] = function.range();
   for (const double scalar : marked) {
     if (scalar < low || scalar > high) continue;

@@ -31,6 +31,11 @@ struct CurveCanvas {
   }
 };
 
+/// Paints the background and a histogram. Heights are logarithmic over four decades, so that thin layers stay visible
+/// beside the far field.
+void paintHistogram(const std::vector<double>& histogram, const CurveCanvas& canvas);
+/// Paints a line from left to right; `height` gives its height at each x, both from 0 to 1.
+void paintLine(const CurveCanvas& canvas, const std::function<float(double)>& height);
 /// Paints histogram, curve and points. `marked`: scalars at which a line stands, those of isosurfaces.
 void paintCurve(const EditedFunction& function, const std::vector<double>& histogram,
                 std::span<const double> marked, const CurveCanvas& canvas);

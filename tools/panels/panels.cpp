@@ -318,40 +318,17 @@ void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string
   }
 }
 
-namespace {
-
-/// Opacity by steepness: none up to a share of the volume that is less steep, all of it from another on.
-bool editGradient(std::vector<OpacityPoint>& points) {
-  bool on = !points.empty();
-  bool changed = ImGui::Checkbox("opacity by gradient", &on);
-  nameWidget("gradient opacity");
-  hint("hides where the scalar hardly changes");
-  const auto set = [&](double from, double to) { points = {{0, 0}, {from, 0}, {to, 1}, {1, 1}}; };
-  if (changed && on) set(0.5, 0.8);
-  if (!on) points.clear();
-  if (points.empty()) return changed;
-  float from = 0, to = 1;
-  for (const OpacityPoint& point : points)
-    if (point.opacity <= points.front().opacity) from = static_cast<float>(point.x);
-  for (size_t n = points.size(); n-- > 0;)
-    if (points[n].opacity >= points.back().opacity) to = static_cast<float>(points[n].x);
-  if (ImGui::DragFloatRange2("##gradient", &from, &to, 0.003f, 0, 1, "from %.2f", "to %.2f")) {
-    set(std::clamp(from, 0.0f, 1.0f), std::clamp(std::max(from, to), 0.0f, 1.0f));
-    changed = true;
-  }
-  nameWidget("gradient shares");
-  hint("shares of the volume that is less steep");
-  return changed;
-}
-
-}  // namespace
-
 void Panels::drawColour(ViewState& state, const PanelFacts& facts, PanelActions& actions) {
   drawScalars(state, facts, actions);
   ImGui::Spacing();
   drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
   ImGui::Separator();
-  actions.changed |= editGradient(state.gradient_opacity);
+  const std::string& scalar = state.opacity_by ? state.opacity_by->variable : state.variable;
+  const GradientPanel::Result result =
+      gradient_.draw(state.gradient_opacity, cache_.variableNamed(scalar), state.scale);
+  actions.changed |= result.changed;
+  actions.dragging |= result.dragging;
+  if (!result.error.empty()) actions.error = result.error;
 }
 
 void Panels::drawDetail(ViewState& state, PanelActions& actions) {

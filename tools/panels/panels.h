@@ -13,6 +13,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/panels/film_panel.h"
 #include "tools/panels/function_panel.h"
+#include "tools/panels/gradient_panel.h"
 #include "tools/panels/labels.h"
 #include "tools/panels/scene_panels.h"
 #include "tools/view/background_jobs.h"
@@ -52,7 +53,12 @@ struct PanelFacts {
 class Panels {
  public:
   explicit Panels(const CacheReader& cache)
-      : cache_(cache), cuts_(cache), surfaces_(cache), function_(cache), opacity_function_(cache) {}
+      : cache_(cache),
+        cuts_(cache),
+        surfaces_(cache),
+        function_(cache),
+        opacity_function_(cache),
+        gradient_(cache) {}
 
   /// Width of the panels in Dear ImGui units, for text of this height.
   static float width(float text_height) { return 26 * text_height; }
@@ -77,6 +83,7 @@ class Panels {
   CutPanel cuts_;
   SurfacePanel surfaces_;
   FunctionPanel function_, opacity_function_;
+  GradientPanel gradient_;
   std::string view_name_;
   FilmPanel film_;
   std::optional<size_t> objects_seen_, keys_seen_;  // in the frame before
