@@ -248,6 +248,7 @@ class StepAddition {
     ConvertOptions options;
     options.surfaces = FacesReader::open(cache_.path(), cache_.manifest()) != nullptr;
     options.planes = planesOf(cache_);
+    options.blank_faces = hasFacesOfBlanks(cache_);
     options.output = options_.cache / geometryFolderName(cache_.series().geometries());
     // A kill between the two steps below leaves a geometry that the series does not have.
     ConversionWorkspace::clearKilled(options.output);

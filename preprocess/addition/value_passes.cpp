@@ -124,6 +124,10 @@ std::vector<IndexPlane> planesOf(const CacheReader& cache) {
   return planes;
 }
 
+bool hasFacesOfBlanks(const CacheReader& cache) {
+  return FacesReader::open(cache.path(), cache.manifest(), kBlanksFileName) != nullptr;
+}
+
 std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryPlan& plan,
                                           Progress& progress) {
   if (!FacesReader::open(job.cache.path(), job.cache.manifest())) return std::nullopt;
@@ -135,7 +139,8 @@ std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryP
     return writeGridFaces(job.reader,
                           {output, job.scratch, job.cache.manifest().lower, job.cache.manifest().upper,
                            planes, job.variables, plan.seam_bytes},
-                          plan.slab_bytes, progress);
+                          plan.slab_bytes, progress)
+        .faces;
   } catch (...) {
     removeAll(output);
     throw;

@@ -105,5 +105,7 @@ std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryP
 
 /// The index planes inside of blocks that a cache has.
 std::vector<IndexPlane> planesOf(const CacheReader& cache);
+/// Whether the cache has the faces of blanked cells.
+bool hasFacesOfBlanks(const CacheReader& cache);
 
 }  // namespace curvisplat

@@ -335,8 +335,11 @@ class Conversion {
                        splats_.survey.upper,
                        options_.planes,
                        std::move(numbers),
-                       plan_.seam_bytes};
-    faces_file_ = origin_->writeFaces(job, progress_);
+                       plan_.seam_bytes,
+                       options_.blank_faces && splats_.survey.blanked.total() > 0
+                           ? workspace_->partial().path() / kBlanksFileName
+                           : std::filesystem::path()};
+    faces_files_ = origin_->writeFaces(job, progress_);
   }
 
   void finish() {
@@ -347,7 +350,8 @@ class Conversion {
   void finishCache() {
     if (splats_removed_.valid()) splats_removed_.get();
     Manifest manifest = manifestOf(*origin_, options_, splats_);
-    if (faces_file_) manifest.files.push_back(*faces_file_);
+    for (const std::optional<FileInfo>& file : {faces_files_.faces, faces_files_.blanks})
+      if (file) manifest.files.push_back(*file);
     manifest.own_blanks = own_blanks_;
     if (!own_blanks_.empty()) manifest.requirements.push_back(kOwnBlanks);
     reportCache(writer_->finish(manifest), report_);
@@ -403,7 +407,7 @@ class Conversion {
   SampledScalars scalars_;
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<CacheWriter> writer_;
-  std::optional<FileInfo> faces_file_;
+  FacesFiles faces_files_;
   std::vector<OwnBlanks> own_blanks_;
   ConvertReport report_;
   std::future<void> splats_removed_;  // last: waits for the end of its thread

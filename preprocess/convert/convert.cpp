@@ -137,6 +137,10 @@ ConvertReport convertScalars(const DataSource& source, ConvertOptions options, P
   if (!grid) {
     if (!options.planes.empty())
       throw UsageError("--surface: {} has no index planes", source.description().format);
+    if (options.blank_faces)
+      throw UsageError(
+          "--surface blanks: {} has no cells with indices; structured grids have faces of blanked cells",
+          source.description().format);
     options.surfaces = false;
   }
   if (options.surfaces) {

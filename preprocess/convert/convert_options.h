@@ -49,6 +49,7 @@ struct ConvertOptions {
   ValuePrecision precision = ValuePrecision::kAuto;  // of the samples' values
   bool surfaces = true;                              // store the grid's outer faces in the cache
   std::vector<IndexPlane> planes;                    // index planes to store besides, with `surfaces`
+  bool blank_faces = false;                          // store the faces of blanked cells, with `surfaces`
   Overlap overlap = Overlap::kOwner;                 // what is drawn where blocks overlap
 
   /// The processes that convert together. Each calls convert() with the same source and options. Borrowed;

@@ -45,8 +45,8 @@ class GridOrigin final : public SplatOrigin {
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
                         Progress& progress) override;
   uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
-  std::optional<FileInfo> writeFaces(const FacesJob& job, Progress& progress) override {
-    return writeGridFaces(reader_, job, smallSlabs(kCornerHalo), progress);
+  FacesFiles writeFaces(const FacesJob& job, Progress& progress) override {
+    return writeGridFaces(reader_, job, smallSlabs(job.halo()), progress);
   }
 
  private:

@@ -117,7 +117,7 @@ class SplatOrigin {
   virtual uint64_t finish(const SinkOfThread&, Progress&) { return 0; }
   /// Writes the surfaces of what the splats fill, if it has any. Call it at any time, after a resumed
   /// conversion too.
-  virtual std::optional<FileInfo> writeFaces(const FacesJob&, Progress&) { return std::nullopt; }
+  virtual FacesFiles writeFaces(const FacesJob&, Progress&) { return {}; }
 };
 
 }  // namespace curvisplat

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "preprocess/faces/blank_faces.h"
+#include "preprocess/faces/face_nodes.h"
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/parallel.h"
 #include "stream/base/error.h"
@@ -58,12 +60,6 @@ bool isThere(const NodeArrays& nodes, size_t at, bool of_cells) {
   return of_cells ? !(nodes.blank[at] & kNoNode) : !nodes.blank[at];
 }
 
-/// Whether a cell is drawn: all corners are there, and it has a value.
-bool cellIsThere(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride) {
-  return !(cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) &&
-         !(nodes.blank[at] & (kNoValue | kBlankValue | kValueNotFinite));
-}
-
 }  // namespace
 
 std::span<const GridFace> facesOfBlock(std::span<const GridFace> faces, uint32_t block) {
@@ -85,8 +81,9 @@ FaceSpool::FaceSpool(const NodeReader& reader, std::vector<GridFace> faces, cons
   }
 }
 
-void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progress& progress) {
-  SlabStream slabs(reader_, buffers, kCornerHalo);
+void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, BlankFaces* blanks,
+                     Progress& progress) {
+  SlabStream slabs(reader_, buffers, blanks ? BlankFaces::kHalo : kCornerHalo);
   size_t first_face = 0, end_face = 0;
   uint32_t block = std::numeric_limits<uint32_t>::max();
   while (const LoadedSlab* loaded = slabs.next()) {
@@ -96,10 +93,11 @@ void FaceSpool::fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progre
       first_face = static_cast<size_t>(of_block.data() - faces_.data());
       end_face = first_face + of_block.size();
     }
+    const GridBlock& whole = reader_.source().description().blocks[block];
+    if (blanks) blanks->add(*loaded, whole, ofCells());
     parallelInvoke([&] { addEnds(*loaded, abutting); },
                    [&] { parallelFor(first_face, end_face, [&](size_t face) { store(*loaded, face); }); });
-    progress.advance(rowsOf(loaded->slab.box) *
-                     loaded->slab.box.rowNodes(reader_.source().description().blocks[block].ni));
+    progress.advance(rowsOf(loaded->slab.box) * loaded->slab.box.rowNodes(whole.ni));
   }
 }
 
@@ -111,11 +109,7 @@ void FaceSpool::store(const LoadedSlab& loaded, size_t face_number) {
   const bool of_cells = ofCells();
   std::vector<std::array<uint32_t, 3>> codes;
   std::vector<float> values;
-  const auto code_of = [&](double at, int axis) {
-    if (!(box_.step[axis] > 0)) return 0u;
-    const double steps = std::nearbyint((at - box_.lower[axis]) / box_.step[axis]);
-    return static_cast<uint32_t>(std::clamp(steps, 0.0, double{FaceBox::kSteps}));
-  };
+  const auto code_of = [&](double at, int axis) { return faceCode(box_, at, axis); };
   // Rows that follow one another in the file are written at once.
   const auto is_last = [&](const LatticeBox& box, uint64_t v) {
     return v + 1 == box.end[1] || box.first[0] > 0 || box.end[0] < face.nodes[0];

@@ -46,6 +46,8 @@ void forRowParts(uint64_t count, const Use& use) {
 /// The faces of a block, out of faces in the order of their blocks. A grid may have 100,000 blocks.
 std::span<const GridFace> facesOfBlock(std::span<const GridFace> faces, uint32_t block);
 
+class BlankFaces;
+
 class FaceSpool {
  public:
   /// `faces`: their lattices.
@@ -54,8 +56,9 @@ class FaceSpool {
   FaceSpool(const FaceSpool&) = delete;
   FaceSpool& operator=(const FaceSpool&) = delete;
 
-  /// Reads the grid, and adds the faces of its cells at blocks' ends to `abutting`.
-  void fill(const SlabBuffers& buffers, AbuttingFaces& abutting, Progress& progress);
+  /// Reads the grid, and adds the faces of its cells at blocks' ends to `abutting`, and those of blanked cells to `blanks`
+  /// if that is not null.
+  void fill(const SlabBuffers& buffers, AbuttingFaces& abutting, BlankFaces* blanks, Progress& progress);
 
   std::span<const GridFace> faces() const { return faces_; }
   const FaceBox& box() const { return box_; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "preprocess/coincidence/abutting_faces.h"
+#include "preprocess/faces/blank_faces.h"
 #include "preprocess/faces/face_patches.h"
 #include "preprocess/faces/face_spool.h"
 #include "stream/base/error.h"
@@ -70,10 +71,20 @@ class FacesPass {
         job_(job),
         progress_(progress),
         abutting_(grid_.blocks, grid_.coordinate_bytes, sortBytes(), job.temporary),
-        spool_(reader, facesOf(grid_, job.planes), FaceBox::of(job.lower, job.upper), job.temporary) {}
+        spool_(reader, facesOf(grid_, job.planes), FaceBox::of(job.lower, job.upper), job.temporary) {
+    if (!job.blanks.empty()) blanks_.emplace(spool_.box(), sortBytes(), job.temporary);
+  }
 
-  std::optional<FileInfo> write(const SlabBuffers& slabs) {
-    spool_.fill(slabs, abutting_, progress_);
+  FacesFiles write(const SlabBuffers& slabs) {
+    spool_.fill(slabs, abutting_, blanks_ ? &*blanks_ : nullptr, progress_);
+    FacesFiles files;
+    if (blanks_) files.blanks = blanks_->write(job_.blanks, progress_);
+    files.faces = writeOuter();
+    return files;
+  }
+
+ private:
+  std::optional<FileInfo> writeOuter() {
     abutting_.keepFolds();
     abutting_.match(progress_);
     const FaceRegions regions(regionsOf(grid_, spool_.faces()));
@@ -92,13 +103,13 @@ class FacesPass {
     return std::nullopt;
   }
 
- private:
+  /// Memory for AbuttingFaces, and as much for BlankFaces.
   uint64_t sortBytes() const {
     const uint64_t needs = 2 * AbuttingFaces::needsOf(grid_.blocks).memory_bytes;
     if (2 * needs > job_.sort_bytes)
       throw Error("--memory: the faces of this grid's blocks take {} MiB; give more, or add --no-surfaces",
                   (2 * needs >> 20) + 1);
-    return job_.sort_bytes - needs;
+    return (job_.sort_bytes - needs) / (job_.blanks.empty() ? 1 : 2);
   }
 
   struct Written {
@@ -191,6 +202,7 @@ class FacesPass {
   Progress& progress_;
   AbuttingFaces abutting_;
   FaceSpool spool_;
+  std::optional<BlankFaces> blanks_;
 };
 
 }  // namespace
@@ -235,9 +247,13 @@ void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes
   }
 }
 
-std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job,
-                                       const SlabBuffers& slabs, Progress& progress) {
-  if (facesOf(reader.source().description(), job.planes).empty()) return std::nullopt;
+Halo FacesJob::halo() const {
+  return blanks.empty() ? kCornerHalo : BlankFaces::kHalo;
+}
+
+FacesFiles writeGridFaces(const NodeReader& reader, const FacesJob& job, const SlabBuffers& slabs,
+                          Progress& progress) {
+  if (facesOf(reader.source().description(), job.planes).empty()) return {};
   return FacesPass(reader, job, progress).write(slabs);
 }
 

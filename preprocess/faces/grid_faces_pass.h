@@ -3,6 +3,7 @@
 //
 //   FaceSpool         nodes of the faces, read from the grid in one pass
 //   AbuttingFaces     quads that another block closes: they are not drawn, unless a boundary has them
+//   BlankFaces        faces between drawn and blanked cells, in a file of their own
 //   writePatches      levels of detail, one face after the other
 #pragma once
 
@@ -37,6 +38,15 @@ struct FacesJob {
   std::vector<IndexPlane> planes;
   std::vector<uint32_t> variables;  // their numbers in the cache
   uint64_t sort_bytes = 0;
+  std::filesystem::path blanks = {};  // blanks.bin; empty: not wanted, or nothing is blanked
+
+  /// The halo of the slabs that the pass reads.
+  Halo halo() const;
+};
+
+/// The manifest's entries of the files; none, and no file, where there is no face to draw.
+struct FacesFiles {
+  std::optional<FileInfo> faces, blanks;
 };
 
 /// The disk space that the pass takes besides the result.
@@ -50,9 +60,8 @@ uint64_t memoryOfFaces(const GridDescription& grid, std::span<const IndexPlane> 
 /// Throws Error for a plane that is not in the grid: which indices there are.
 void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes);
 
-/// Returns the manifest's entry; none, and no file, if there is no face to draw. The bytes depend neither on
-/// threads nor on memory. Throws Error if the disk fails or the faces do not fit in memory.
-std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job,
-                                       const SlabBuffers& slabs, Progress& progress);
+/// The bytes depend neither on threads nor on memory. Throws Error if the disk fails or the faces do not fit in memory.
+FacesFiles writeGridFaces(const NodeReader& reader, const FacesJob& job, const SlabBuffers& slabs,
+                          Progress& progress);
 
 }  // namespace curvisplat

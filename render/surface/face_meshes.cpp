@@ -263,13 +263,14 @@ SurfaceScene FaceMeshes::withMeshes(const std::shared_ptr<const SurfaceScene>& s
 }
 
 uint64_t FaceMeshes::bytes(const SurfaceScene& scene, uint64_t pixels) {
-  uint64_t nodes = 0;
+  uint64_t nodes = 0, coarsest = 0;
   for (const GridSurface& surface : scene.grid_surfaces)
     for (const GridSurface::Part& part : surface.parts) {
       const GridFace& face = surface.faces->faces()[part.face];
       nodes += face.nodes[0] * face.nodes[1];
+      coarsest += surface.faces->patches()[face.root].nodeCount();
     }
-  return kBytesANode * std::min<uint64_t>(nodes, mostNodes(pixels));
+  return kBytesANode * std::max(coarsest, std::min<uint64_t>(nodes, mostNodes(pixels)));
 }
 
 }  // namespace curvisplat

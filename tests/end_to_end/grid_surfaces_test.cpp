@@ -11,11 +11,13 @@
 #include <memory>
 #include <set>
 
+#include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image_file.h"
 #include "render/surface/face_meshes.h"
 #include "stream/base/error.h"
 #include "stream/cache/faces_file.h"
+#include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/support/program_test.h"
 
@@ -199,6 +201,56 @@ TEST_F(GridSurfaceOptions, APartOfAFaceIsAPartOfItsPicture) {
   EXPECT_GT(right, 100u);
   EXPECT_NEAR(static_cast<double>(left + right), static_cast<double>(whole),
               0.03 * static_cast<double>(whole));
+}
+
+/// A grid over waves: its nodes below k = `blanked` are blanked, and those below k = `first` are left out.
+FunctionGridSource overWaves(uint64_t blanked, uint64_t first) {
+  return {{gridBlock(41, 31, 21 - first)}, 1, [=](const GridNode& node) {
+            const auto i = static_cast<double>(node.i), j = static_cast<double>(node.j);
+            const auto k = static_cast<double>(node.k + first);
+            return NodeValues{{i, j, k + 2 * std::sin(0.3 * i) * std::cos(0.2 * j)},
+                              {static_cast<float>(k)},
+                              node.k + first < blanked};
+          }};
+}
+
+TEST_F(GridSurfaceOptions, BlankedCellsEndAtASurface) {
+  ConvertOptions options;
+  options.output = file("blanked.splats");
+  options.scalars = {0};
+  options.blank_faces = true;
+  Progress progress;
+  convert(overWaves(8, 0), options, progress);
+  convertGrid(overWaves(8, 8), file("cut.splats"));
+  const auto drawn = [&](const std::string& cache, const Words& more) {
+    run(render(Words{"--lod-pixels", "0", "--view-angle", "30"} + more, cache));
+    return readImage(file("a.pfm"));
+  };
+  const auto alone = [&](const std::string& cache, const std::string& surface) {
+    return drawn(cache, {"--volume", "off", "--surface", surface});
+  };
+  const Image floor = alone("blanked.splats", "blanks");
+  EXPECT_GT(compareImages(floor, alone("cut.splats", "kmin")).psnr_db, 60);
+  EXPECT_LT(compareImages(floor, alone("cut.splats", "kmax")).psnr_db, 40);
+  // With the volume, by every painter, and whatever the memory.
+  const Words with_volume{"--surface", "blanks", "--surface", "imin", "--surface-by", "s0"};
+  const Image cpu = drawn("blanked.splats", Words{"--backend", "cpu"} + with_volume);
+  EXPECT_GT(compareImages(cpu, drawn("blanked.splats", Words{"--backend", "osmesa"} + with_volume)).psnr_db,
+            50);
+  EXPECT_EQ(
+      drawn("blanked.splats", Words{"--backend", "cpu", "--threads", "1", "--memory", "160M"} + with_volume)
+          .rgba,
+      cpu.rgba);
+  EXPECT_LT(compareImages(cpu, drawn("blanked.splats", {"--backend", "cpu"})).psnr_db, 40);
+  run({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("whole.splats"), "--surface",
+       "blanks,k=20"});
+  expectRefused(render({"--surface", "blanks"}, "whole.splats"), 1,
+                {"has no faces of blanked cells; convert its grid again with --surface blanks"});
+  expectRefused(render({"--surface", "imin,blanks"}, "blanked.splats"), 1,
+                {"give blanks a --surface of its own"});
+  expectRefused(render({"--surface", "blanks", "--surface-by", "s0", "--surface-opacity", "function"},
+                       "blanked.splats"),
+                2, {"blanks has no values for a function"});
 }
 
 TEST_F(GridSurfaceOptions, VerifyFindsDamagedFaces) {

@@ -2,6 +2,7 @@
 // that the bytes depend on the grid alone.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -48,6 +49,7 @@ class GridFacesTest : public testing::Test {
     options.threads = threads_;
     options.planes = std::move(planes);
     options.scalars = {0, 1};
+    options.blank_faces = blank_faces_;
     Progress progress;
     convert(source, options, progress);
     manifest_ = CacheReader(options.output).manifest();
@@ -59,6 +61,7 @@ class GridFacesTest : public testing::Test {
   Manifest manifest_;
   uint64_t memory_ = 1 << 30;
   unsigned threads_ = 2;
+  bool blank_faces_ = true;
 };
 
 uint64_t quadsOf(const FacesReader& faces, const GridFace& face) {
@@ -96,6 +99,95 @@ TEST_F(GridFacesTest, BlankedNodesLeaveHoles) {
     if (face.axis == 2 && face.side == FaceSide::kMin) {
       EXPECT_EQ(quadsOf(*faces, face), 5u * 4 - 4);
     }
+}
+
+/// Quads by the sums of their corners, which are whole numbers here.
+using QuadSums = std::multiset<std::array<int64_t, 3>>;
+
+std::array<int64_t, 3> roundedSum(const std::array<glm::dvec3, 4>& corners) {
+  const glm::dvec3 sum = corners[0] + corners[1] + corners[2] + corners[3];
+  return {std::llround(sum.x), std::llround(sum.y), std::llround(sum.z)};
+}
+
+QuadSums blankQuadsOf(const FacesReader& blanks) {
+  QuadSums sums;
+  for (uint32_t n = 0; n < blanks.patches().size(); ++n) {
+    const PatchNodes nodes = blanks.read(n);
+    const size_t columns = blanks.patches()[n].nodes[0];
+    for (size_t q = 0; q < nodes.quads.size(); ++q) {
+      if (!nodes.quads[q]) continue;
+      const size_t at = q / (columns - 1) * columns + q % (columns - 1);
+      const auto& p = nodes.positions;
+      sums.insert(roundedSum({p[at], p[at + 1], p[at + columns], p[at + columns + 1]}));
+    }
+  }
+  return sums;
+}
+
+NodeValues straight(const GridNode& node) {
+  NodeValues values = bent(node);
+  values.position = {node.i, node.j, node.k};
+  return values;
+}
+
+/// A floor of steps, an island and a hole inside.
+bool isBlanked(uint64_t i, uint64_t j, uint64_t k) {
+  return k < (i * 7 + j * 3) % 5 || (i < 12 && j > 60) || (i > 80 && i < 85 && j > 20 && j < 30 && k == 8);
+}
+
+QuadSums expectedBlankQuads(const std::array<uint64_t, 3>& size) {
+  const auto is_there = [&](const std::array<uint64_t, 3>& cell) {
+    for (uint64_t n = 0; n < 8; ++n)
+      if (isBlanked(cell[0] + (n & 1), cell[1] + (n >> 1 & 1), cell[2] + (n >> 2))) return false;
+    return true;
+  };
+  QuadSums sums;
+  for (size_t axis = 0; axis < 3; ++axis)
+    for (uint64_t k = 0; k + 1 < size[2]; ++k)
+      for (uint64_t j = 0; j + 1 < size[1]; ++j)
+        for (uint64_t i = 0; i + 1 < size[0]; ++i) {
+          const std::array<uint64_t, 3> above{i, j, k};
+          std::array<uint64_t, 3> below = above;
+          if (below[axis]-- == 0 || is_there(above) == is_there(below)) continue;
+          std::array<glm::dvec3, 4> corners{};
+          for (uint64_t n = 0; n < 4; ++n) {
+            std::array<uint64_t, 3> at = above;
+            at[axis == 0 ? 1 : 0] += n & 1;
+            at[axis == 2 ? 1 : 2] += n >> 1;
+            GridNode node{};
+            node.i = at[0], node.j = at[1], node.k = at[2];
+            corners[n] = straight(node).position;
+          }
+          sums.insert(roundedSum(corners));
+        }
+  return sums;
+}
+
+TEST_F(GridFacesTest, FacesOfBlankedCellsAreThoseBetweenDrawnAndBlankedOnes) {
+  const auto blanksOf = [&](uint64_t memory, unsigned threads) {
+    memory_ = memory;
+    threads_ = threads;
+    convertAndOpen(FunctionGridSource({gridBlock(90, 80, 20)}, 2, [](const GridNode& node) {
+      NodeValues values = straight(node);
+      values.blank = isBlanked(node.i, node.j, node.k);
+      return values;
+    }));
+    return FacesReader::open(folder_ / "a.splats", manifest_, kBlanksFileName);
+  };
+  const auto blanks = blanksOf(1 << 30, 2);
+  ASSERT_TRUE(blanks);
+  EXPECT_EQ(blankQuadsOf(*blanks), expectedBlankQuads({90, 80, 20}));
+  const std::string bytes = readTextFile(folder_ / "a.splats/blanks.bin");
+  EXPECT_LT(bytes.size(), 30 * blankQuadsOf(*blanks).size());
+  ASSERT_TRUE(blanksOf(uint64_t{200} << 20, 1));
+  EXPECT_EQ(readTextFile(folder_ / "a.splats/blanks.bin"), bytes);
+  blank_faces_ = false;
+  EXPECT_FALSE(blanksOf(1 << 30, 2));
+}
+
+TEST_F(GridFacesTest, AGridWithoutBlankedNodesHasNoFacesOfThem) {
+  ASSERT_TRUE(convertAndOpen(twoBlocks(6, 5, 4)));
+  EXPECT_FALSE(FacesReader::open(folder_ / "a.splats", manifest_, kBlanksFileName));
 }
 
 TEST_F(GridFacesTest, APlaneInsideIsKeptWhenAskedFor) {

@@ -337,10 +337,10 @@ void addConvert(CLI::App& app) {
   command->add_flag("--overwrite", arguments->overwrite,
                     "Replace an existing cache; discard an interrupted conversion unless --resume is given");
   command
-      ->add_option(
-          "--surface", arguments->planes,
-          "Index plane to keep as a surface besides the outer faces: k=10 or \"block 1:k=10\", indices "
-          "from 0; repeatable")
+      ->add_option("--surface", arguments->planes,
+                   "Surface to keep besides the outer faces: an index plane, k=10 or \"block 1:k=10\", "
+                   "indices from 0, "
+                   "or blanks, the faces between drawn and blanked cells; repeatable")
       ->take_all()
       ->allow_extra_args(false);
   command->add_flag(

@@ -369,13 +369,17 @@ void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options) {
     throw UsageError("--no-surfaces contradicts --surface {}; give one of them", arguments.planes.front());
   for (const std::string& list : arguments.planes)
     for (const std::string& text : splitAtCommas(list)) {
+      if (text == kBlanks) {
+        options.blank_faces = true;
+        continue;
+      }
       const auto name = parseFaceName(text);
       const bool has_range = name && (name->ranges[0] || name->ranges[1] || name->ranges[2]);
       if (!name || name->at != FaceName::At::kIndex || has_range)
         throw UsageError(
-            "--surface {}: expected an index plane such as k=10 or \"block 1:k=10\", indices from 0 (the "
-            "outer "
-            "faces go into the cache anyway)",
+            "--surface {}: expected an index plane such as k=10 or \"block 1:k=10\", indices from 0, or "
+            "blanks "
+            "(the outer faces go into the cache anyway)",
             text);
       const IndexPlane plane{name->block, name->axis, name->index};
       if (std::find(options.planes.begin(), options.planes.end(), plane) == options.planes.end())

@@ -41,6 +41,7 @@ SeriesOptions optionsLike(const CacheReader& cache, const fs::path& output) {
   options.convert.title = cache.seriesManifest().title;
   options.convert.surfaces = FacesReader::open(cache.path(), cache.manifest()) != nullptr;
   options.convert.planes = planesOf(cache);
+  options.convert.blank_faces = hasFacesOfBlanks(cache);
   options.convert.precision = precisionOf(cache.manifest());
   if (cache.manifest().overlap == kOverlapAll) options.convert.overlap = Overlap::kAll;
   return options;

@@ -258,7 +258,7 @@ std::string meantBy(const std::string& word, const Manifest& manifest, const Fac
   if (word.starts_with("block") && (!name || name->at != FaceName::At::kIndex || lacksBlock(*name, manifest)))
     return blocks == 1 ? " (the grid has one block, block 1)"
                        : fmt::format(" (the grid has blocks 1 to {})", blocks);
-  std::vector<std::string> names{"imin", "imax", "jmin", "jmax", "kmin", "kmax", "all", "walls"};
+  std::vector<std::string> names{"imin", "imax", "jmin", "jmax", "kmin", "kmax", "all", "walls", kBlanks};
   for (const FaceRegion& region : faces.regions()) names.push_back(region.name);
   std::erase(names, word);  // a name that there is, of which this cache has nothing
   return didYouMean(word, names);
@@ -277,10 +277,27 @@ size_t variableOf(const std::string& name, const CacheReader& cache) {
   }
 }
 
+/// The faces between drawn and blanked cells.
+GridSurface blanksOf(const CacheReader& cache) {
+  GridSurface surface;
+  surface.faces = FacesReader::open(cache.path(), cache.manifest(), kBlanksFileName);
+  if (!surface.faces)
+    throw Error(
+        "{}: --surface {}: the cache has no faces of blanked cells; convert its grid again with --surface {} "
+        "(if it is structured and has blanked cells)",
+        cache.path().string(), kBlanks, kBlanks);
+  for (uint32_t n = 0; n < surface.faces->faces().size(); ++n) {
+    const GridFace& face = surface.faces->faces()[n];
+    surface.parts.push_back({n, {0, 0}, {face.nodes[0] - 1, face.nodes[1] - 1}});
+  }
+  return surface;
+}
+
 }  // namespace
 
 GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
                              const std::shared_ptr<const FacesReader>& faces) {
+  if (text == kBlanks) return blanksOf(cache);
   const std::string path = cache.path().string();
   if (!faces && isUnstructured(cache.manifest()))
     throw Error(
@@ -301,6 +318,7 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
     begin = end + 1;
     word.erase(0, word.find_first_not_of(' '));
     if (finder.add(word)) continue;
+    if (word == kBlanks) throw Error("{}: --surface {}: give {} a --surface of its own", path, text, kBlanks);
     const auto name = parseFaceName(word);
     const bool is_plane = name && canBeKept(*name, cache.manifest());
     throw Error("{}: --surface {} names no face of the cache and no file{}; {}{}", path,
@@ -317,6 +335,7 @@ std::vector<GridSurface> gridSurfacesNamed(const std::vector<WantedFaces>& wante
   std::vector<GridSurface> surfaces;
   for (const WantedFaces& one : wanted) {
     GridSurface& surface = surfaces.emplace_back(gridSurfaceNamed(one.name, cache, faces));
+    if (one.name == kBlanks) continue;  // without values
     if (!by.empty()) surface.scalar = scalarOfFaces(*faces, by, cache);
     if (one.has_opacities) takeOpacities(surface, opacity_by, cache);
   }
@@ -325,7 +344,10 @@ std::vector<GridSurface> gridSurfacesNamed(const std::vector<WantedFaces>& wante
 
 std::vector<std::string> faceNamesOf(const CacheReader& cache) {
   const auto faces = FacesReader::open(cache.path(), cache.manifest());
-  if (!faces) return {};
+  const std::vector<FileInfo>& files = cache.manifest().files;
+  const bool has_blanks = std::any_of(files.begin(), files.end(),
+                                      [](const FileInfo& file) { return file.name == kBlanksFileName; });
+  if (!faces) return has_blanks ? std::vector<std::string>{kBlanks} : std::vector<std::string>{};
   std::vector<std::string> names, of_blocks;
   std::set<std::string> known;
   const auto add = [&](std::vector<std::string>& list, const std::string& name) {
@@ -341,6 +363,7 @@ std::vector<std::string> faceNamesOf(const CacheReader& cache) {
   std::sort(names.begin(), names.end());
   if (names.size() > 1) names.insert(names.begin(), "all");
   if (std::any_of(faces->regions().begin(), faces->regions().end(), isWall)) add(names, "walls");
+  if (has_blanks) add(names, kBlanks);
   // A comma is taken for the end of a name.
   for (const FaceRegion& region : faces->regions())
     if (!region.name.empty() && region.name.find(',') == std::string::npos) add(names, region.name);

@@ -121,7 +121,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       .add_option(
           "--surface", arguments.surfaces,
           "Opaque surface in the volume, lit: faces of the grid (imin, imax, ... kmax, \"block 3:k=min\", "
-          "all, "
+          "all, blanks (between drawn and blanked cells), "
           "walls, or a boundary condition's name; several with commas), or an STL, PLY, OBJ or VTP file in "
           "coordinates before --scale; repeatable")
       ->take_all()
@@ -237,8 +237,9 @@ std::vector<GridSurface> facesAt(const SurfaceArguments& arguments, const CacheR
   for (const std::string& text : arguments.surfaces) {
     if (isSurfaceFile(text)) continue;
     GridSurface& surface = surfaces.at(of_grid++);
-    surface.faces = faces;
-    surface.parts = gridSurfaceNamed(text, cache, faces).parts;
+    GridSurface named = gridSurfaceNamed(text, cache, faces);
+    surface.faces = named.faces;
+    surface.parts = std::move(named.parts);
     if (surface.scalar) surface.scalar = scalarOfFaces(*faces, arguments.surface_by, cache);
     if (!surface.opacity_name.empty()) takeOpacities(surface, surface.opacity_name, cache);
   }
@@ -274,6 +275,11 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
         scene->grid_surfaces.emplace_back(gridSurfaceNamed(arguments.surfaces[n], cache, faces));
     surface.colour = colour;
     surface.opacity = surfaceOpacity(arguments, n);
+    if (arguments.surfaces[n] == kBlanks) {
+      if (surface.opacity.by_function)
+        throw UsageError("--surface-opacity: {} has no values for a function; give a number", kBlanks);
+      continue;
+    }
     if (!arguments.surface_by.empty())
       colourByScalar(surface, arguments.surface_by, cache, scalars.colours, scalars.maps);
     if (surface.opacity.by_function && scalars.opacity_by && scalars.areTwo())

@@ -383,7 +383,7 @@ class Cache:
 
         step: of a series; or time: the step nearest to it, with interpolate what lies between two.
 
-        surfaces: files, or faces of the grid such as "kmin"; surface_by: the scalar that colours them, or
+        surfaces: files, or faces of the grid such as "kmin" or "blanks"; surface_by: the scalar that colours them, or
         surface_colours; surface_opacity: of all, or of each.
 
         slices: (px, py, pz, nx, ny, nz) each.
