@@ -1,5 +1,5 @@
 // The faces between drawn and blanked cells of a grid, as a surface: a sea's floor and coasts, a body that iblank cuts
-// out. blanks.bin has them, in the form of faces.bin (stream/FORMAT.md).
+// out. faces.blanks.bin has them, in the form of faces.bin (stream/FORMAT.md).
 //
 //   slabs --add()--> quads, sorted by plane and row --write()--> strips of quads, 32 in a patch
 //

@@ -38,7 +38,7 @@ struct FacesJob {
   std::vector<IndexPlane> planes;
   std::vector<uint32_t> variables;  // their numbers in the cache
   uint64_t sort_bytes = 0;
-  std::filesystem::path blanks = {};  // blanks.bin; empty: not wanted, or nothing is blanked
+  std::filesystem::path blanks = {};  // faces.blanks.bin; empty: not wanted, or nothing is blanked
 
   /// The halo of the slabs that the pass reads.
   Halo halo() const;

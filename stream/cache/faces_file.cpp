@@ -170,7 +170,7 @@ std::string facesFileOfStep(uint64_t step) {
 }
 
 bool isFacesFile(const std::string& name) {
-  return name == kBlanksFileName || (name.starts_with("faces.") && name.ends_with(".bin"));
+  return name.starts_with("faces.") && name.ends_with(".bin");
 }
 
 FacesWriter::FacesWriter(const std::filesystem::path& path, const FaceBox& box,

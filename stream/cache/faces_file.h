@@ -30,7 +30,7 @@ inline constexpr const char* kFacesFileName = "faces.bin";
 std::string facesFileOfVariable(uint32_t number);
 std::string facesFileOfStep(uint64_t step);
 /// Faces between drawn and blanked cells: each is a patch of strips of quads, without levels of detail.
-inline constexpr const char* kBlanksFileName = "blanks.bin";
+inline constexpr const char* kBlanksFileName = "faces.blanks.bin";
 /// Whether the name is that of any file of faces.
 bool isFacesFile(const std::string& name);
 inline constexpr std::array<char, 8> kFacesMagic{'C', 'V', 'S', 'f', 'a', 'c', 'e', 's'};

@@ -177,10 +177,10 @@ TEST_F(GridFacesTest, FacesOfBlankedCellsAreThoseBetweenDrawnAndBlankedOnes) {
   const auto blanks = blanksOf(1 << 30, 2);
   ASSERT_TRUE(blanks);
   EXPECT_EQ(blankQuadsOf(*blanks), expectedBlankQuads({90, 80, 20}));
-  const std::string bytes = readTextFile(folder_ / "a.splats/blanks.bin");
+  const std::string bytes = readTextFile(folder_ / "a.splats/faces.blanks.bin");
   EXPECT_LT(bytes.size(), 30 * blankQuadsOf(*blanks).size());
   ASSERT_TRUE(blanksOf(uint64_t{200} << 20, 1));
-  EXPECT_EQ(readTextFile(folder_ / "a.splats/blanks.bin"), bytes);
+  EXPECT_EQ(readTextFile(folder_ / "a.splats/faces.blanks.bin"), bytes);
   blank_faces_ = false;
   EXPECT_FALSE(blanksOf(1 << 30, 2));
 }
