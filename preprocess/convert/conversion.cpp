@@ -162,6 +162,8 @@ class Conversion {
     if (!isFirst()) return;
     report_.warnings = origin_->warnings();
     warnOfValues();
+    if (options_.blank_faces && splats_.survey.blanked.total() == 0)
+      report_.warnings.emplace_back("--surface blanks: nothing is blanked, so the cache has no such faces");
     report_.notes = origin_->notes();
     splats_.overlap = origin_->overlap();
   }

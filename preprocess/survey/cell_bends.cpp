@@ -31,8 +31,8 @@ constexpr double kMaxDeviation = 1.0;  // of a block that is not cut
 constexpr double kMaxDeviationOfSmall = 0.6;
 constexpr uint64_t kSmallGrid = 100'000;  // nodes
 constexpr uint64_t kLargeGrid = 1'000'000;
-constexpr uint64_t kSampledNodes =
-    2'000'000;  // of large grids, so that it takes a few percent of a conversion
+// Of large grids, so that it takes a few percent of a conversion.
+constexpr uint64_t kSampledNodes = 2'000'000;
 
 /// The axes of a pair, in the order of BlockBends::squares.
 std::array<size_t, 2> axesOf(size_t pair) {
@@ -144,7 +144,7 @@ uint64_t nodesOf(const std::vector<GridBlock>& blocks) {
   return nodes;
 }
 
-/// One in so many slabs of each block, evenly, and at least one.
+/// Every nth slab of each block, with n = one_in, and at least one of each block.
 std::vector<Slab> sampleOf(const std::vector<Slab>& slabs, uint64_t one_in) {
   std::vector<Slab> sample;
   for (size_t begin = 0, end = 0; begin < slabs.size(); begin = end) {
@@ -323,7 +323,7 @@ Refinement refinementByNeed(const GridSource& source) {
   return CutChoice(blocks, bends, joinedAxes(source), max).run(most);
 }
 
-std::string noteOnCells(const GridSource& source) {
+std::string noteOnCells(const GridSource& source, bool by_need) {
   constexpr double kMinShare = 0.05;  // of the volume
   const std::vector<GridBlock>& blocks = source.description().blocks;
   if (nodesOf(blocks) > kMaxCutByNeed) return {};
@@ -344,6 +344,7 @@ std::string noteOnCells(const GridSource& source) {
       count < blocks.size() ? fmt::format(" of {} of {} blocks", count, blocks.size()) : "",
       std::sqrt(square / shown),
       source.description().refinement.cutsCells() ? "--refine N with a larger N makes them smaller"
+      : by_need                                   ? "--refine N cuts all of them"
                                                   : "--refine auto cuts them where it helps, --refine N all");
 }
 

@@ -50,8 +50,9 @@ inline constexpr uint64_t kMaxCutByNeed = 16'000'000;
 /// grid cannot be read.
 Refinement refinementByNeed(const GridSource& source);
 
-/// A line for users if a picture of the grid will show its cells: what helps. Otherwise empty. Looks at some
-/// slabs of large grids only. Throws Error if the grid cannot be read.
-std::string noteOnCells(const GridSource& source);
+/// A line for users if a picture of the grid will show its cells: what helps. Otherwise empty. `by_need`: whether
+/// refinementByNeed() has chosen its cuts. Looks at some slabs of large grids only. Throws Error if the grid cannot be
+/// read.
+std::string noteOnCells(const GridSource& source, bool by_need = false);
 
 }  // namespace curvisplat

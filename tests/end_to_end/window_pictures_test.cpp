@@ -290,8 +290,8 @@ TEST_F(WindowMovie, AFilmIsMadePlayedSavedAndDrawnAsRenderDrawsIt) {
   save();
   const auto command = close().at(0);
   EXPECT_EQ(filesIn("movie"), 7u);  // with the film
-  EXPECT_EQ(valueOf(command, "--path"), "a_film.json");
-  EXPECT_EQ(bytesOfFile("a_film.json"), bytesOfFile("movie/film.json"));
+  EXPECT_EQ(valueOf(command, "--path"), "a_shown_film.json");
+  EXPECT_EQ(bytesOfFile("a_shown_film.json"), bytesOfFile("movie/film.json"));
   draw(command, {});
   for (const int frame : {0, 3, 5}) expectSame(frame);
   EXPECT_LT(difference(readImage("movie/m_0000.png"), readImage("movie/m_0003.png")), 40);

@@ -57,7 +57,15 @@ TEST(FilmEdit, KeyFramesAreAddedMovedAndRemoved) {
   film.replace(view(8), {});
   EXPECT_EQ(film.keys()[3].frame.camera.position.x, 8);
   EXPECT_NE(film.keys()[3].picture, picture);
-  for (int n = 0; n < 4; ++n) film.remove();
+  film.goTo(0);
+  film.remove();
+  EXPECT_EQ(timesOf(film), (Times{2, 3.5, 4}));
+  EXPECT_EQ(film.frames(), 51u) << "from the first key frame on, in the window and in movies";
+  film.goTo(4);
+  film.play(100);
+  EXPECT_EQ(film.time(), 2);
+  film.stop();
+  for (int n = 0; n < 3; ++n) film.remove();
   EXPECT_EQ(film.film(), nullptr);
   film.remove();
   EXPECT_EQ(film.time(), 0);

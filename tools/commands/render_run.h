@@ -69,7 +69,7 @@ struct FrameJob {
   FrameOutput* output;  // null at ranks that write nothing
   RenderReport& report;
   std::function<void()> step_changed;          // called when the player is at another time than before
-  std::function<void(uint64_t frame)> show;    // called before a frame is drawn: takes the look of a film
+  std::function<void(uint64_t frame)> show;    // called before a frame is drawn, for a film's function and cuts
   std::optional<AnnotatedScene::OnGlobe> box;  // of the axes grid
 };
 

@@ -308,7 +308,8 @@ std::vector<std::string> notesOnCells(const DataSource& source, const ConvertArg
                     in_files, nodes));
   }
   const ConversionThreads bound(threadsFor(arguments.threads));
-  if (std::string note = noteOnCells(*grid); !note.empty()) notes.push_back(std::move(note));
+  if (std::string note = noteOnCells(*grid, arguments.refine.value_or(kByNeed) == kByNeed); !note.empty())
+    notes.push_back(std::move(note));
   return notes;
 }
 

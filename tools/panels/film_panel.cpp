@@ -54,7 +54,7 @@ void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelAc
   ImGui::SameLine();
   does.remove |= button("delete", "delete key frame", selects, "the selected one");
   ImGui::SameLine();
-  does.play |= button(film.isPlaying() ? "stop" : "play", "play film", film.end() > 0, nullptr);
+  does.play |= button(film.isPlaying() ? "stop" : "play", "play film", film.end() > film.begin(), nullptr);
   does.open |= button("open...", "open film", true, "a file of key frames, as render --path draws it");
   ImGui::SameLine();
   does.save |=
@@ -172,7 +172,8 @@ void FilmPanel::drawTime(const FilmEdit& film, FilmActions& actions) {
   nameWidget("film time");
   ImGui::EndDisabled();
   ImGui::SameLine();
-  const std::string length = fmt::format("of {:.4g} s, {} pictures", film.end(), film.frames());
+  const std::string length =
+      fmt::format("of {:.4g} s, {} pictures", film.end() - film.begin(), film.frames());
   ImGui::TextDisabled("%s", length.c_str());
   nameWidget("film length " + length);
 }

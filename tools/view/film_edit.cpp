@@ -44,7 +44,7 @@ std::optional<size_t> FilmEdit::selected() const {
 }
 
 uint64_t FilmEdit::frames() const {
-  return 1 + static_cast<uint64_t>(std::llround(kFramesPerSecond * end()));
+  return 1 + static_cast<uint64_t>(std::llround(kFramesPerSecond * (end() - begin())));
 }
 
 FilmEdit::Key FilmEdit::keyOf(const ViewState& state, std::optional<double> series_time) {
@@ -114,7 +114,7 @@ void FilmEdit::move(size_t key, double time) {
 
 void FilmEdit::goTo(double time) {
   stop();
-  time_ = std::clamp(time, 0.0, end());
+  time_ = std::clamp(time, begin(), end());
 }
 
 void FilmEdit::open(const Film& film, const ViewState& state, std::optional<double> series_time) {
@@ -139,13 +139,13 @@ void FilmEdit::open(const Film& film, const ViewState& state, std::optional<doub
 }
 
 void FilmEdit::play(double now_s) {
-  if (time_ >= end()) goTo(0);
-  if (end() > 0) began_s_ = now_s - time_;
+  if (time_ >= end()) goTo(begin());
+  if (end() > begin()) began_s_ = now_s - time_;
 }
 
 bool FilmEdit::tick(double now_s) {
   if (!began_s_) return false;
-  time_ = std::clamp(now_s - *began_s_, 0.0, end());
+  time_ = std::clamp(now_s - *began_s_, begin(), end());
   if (time_ >= end()) stop();
   return true;
 }

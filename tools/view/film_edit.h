@@ -33,6 +33,8 @@ class FilmEdit {
   };
   const std::vector<Key>& keys() const { return keys_; }
   double time() const { return time_; }
+  /// The film is from the first key frame to the last.
+  double begin() const { return keys_.empty() ? 0 : keys_.front().frame.time; }
   double end() const { return keys_.empty() ? 0 : keys_.back().frame.time; }
   /// The key frame at time().
   std::optional<size_t> selected() const;

@@ -135,6 +135,10 @@ void CacheView::drawFilmPictures() {
     window_.redraw();
     done->job.get();  // throws; what failed stays empty
   }
+  std::erase_if(film_pictures_, [&](const auto& entry) {
+    return std::ranges::none_of(film_.keys(),
+                                [&](const FilmEdit::Key& key) { return key.picture == entry.first; });
+  });
   std::vector<uint64_t> missing;
   std::vector<double> times;
   for (const FilmEdit::Key& key : film_.keys()) {

@@ -236,6 +236,7 @@ void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
 
 /// Saves a movie of what is shown now, whatever is changed while it is drawn.
 void CacheView::saveMovieTo(const fs::path& file) {
+  if (movie_kind_ == MovieKind::kFilm && !film_.film()) return;  // its key frames were removed meanwhile
   wanted_movie_ = newMovie(file);
 }
 
@@ -258,6 +259,7 @@ MovieRequest CacheView::newMovie(const fs::path& file) const {
 void CacheView::copyCommand(MovieKind what) {
   try {
     const bool of_film = what == MovieKind::kFilm;
+    if (of_film && !film_.film()) return;  // its key frames were removed meanwhile
     CommandOptions options{shortPath(preview_ ? preview_->whole : cache_.wholePath()),
                            picture_size_,
                            {},
@@ -275,7 +277,8 @@ void CacheView::copyCommand(MovieKind what) {
       writeFileDurably(file, toParaViewPreset(function.definition()));
     };
     if (of_film) {
-      options.film = fmt::format("{}_film.json", cache_.wholePath().stem().string());
+      // Another name than that of a film that is saved, which may have been changed since.
+      options.film = fmt::format("{}_shown_film.json", cache_.wholePath().stem().string());
       options.film_frames = film_.frames();
       writeFileDurably(options.film, film_.film()->toJson());
     } else {
