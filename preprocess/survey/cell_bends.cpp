@@ -31,7 +31,7 @@ constexpr double kMaxDeviation = 1.0;  // of a block that is not cut
 constexpr double kMaxDeviationOfSmall = 0.6;
 constexpr uint64_t kSmallGrid = 100'000;  // nodes
 constexpr uint64_t kLargeGrid = 1'000'000;
-// Of large grids, so that it takes a few percent of a conversion.
+// A large grid's survey takes a few percent of a conversion.
 constexpr uint64_t kSampledNodes = 2'000'000;
 
 /// The axes of a pair, in the order of BlockBends::squares.

@@ -68,8 +68,8 @@ struct FrameJob {
   StepPlayer& player;
   FrameOutput* output;  // null at ranks that write nothing
   RenderReport& report;
-  std::function<void()> step_changed;          // called when the player is at another time than before
-  std::function<void(uint64_t frame)> show;    // called before a frame is drawn, for a film's function and cuts
+  std::function<void()> step_changed;        // called when the player is at another time than before
+  std::function<void(uint64_t frame)> show;  // called before a frame is drawn, for a film's function and cuts
   std::optional<AnnotatedScene::OnGlobe> box;  // of the axes grid
 };
 
