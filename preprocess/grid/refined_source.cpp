@@ -189,27 +189,17 @@ class RefinedSource final : public ForwardingGrid {
 
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
-    const NodesAround around = aroundOf(block, box);
-    NodeArrays grid;
-    ForwardingGrid::read(block, around.box(), scalars, grid);
-    const std::array<PartsBetween, 3>& between = between_[block];
-    const uint64_t ni = description_.blocks[block].ni;
-    const size_t count = box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0);
+    const size_t count = box.rowNodes(description_.blocks[block].ni) * (box.j1 - box.j0) * (box.k1 - box.k0);
     for (auto* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
     out.scalars.resize(scalars.size());
     for (std::vector<float>& values : out.scalars) values.resize(count);
-    size_t at = 0;
-    forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
-      const PlaceBetween place = around.placeOf(node);
-      out.x[at] = valueAt(grid.x, place, between);
-      out.y[at] = valueAt(grid.y, place, between);
-      out.z[at] = valueAt(grid.z, place, between);
-      for (size_t n = 0; n < scalars.size(); ++n)
-        out.scalars[n][at] =
-            isOfCells(scalars[n]) ? grid.scalars[n][place.at] : valueAt(grid.scalars[n], place, between);
-      ++at;
-    });
-    fillBlanks(around, box, ni, missingOf(scalars, grid), grid.blank, out.blank);
+    out.blank.clear();
+    out.blank.reserve(count);
+    const uint64_t planes = planesAtATime(block, box);
+    for (NodeBox part = box; part.k0 < box.k1; part.k0 = part.k1) {
+      part.k1 = std::min(part.k0 + planes, box.k1);
+      readNext(block, part, scalars, out);
+    }
   }
 
   uint64_t rowsInMemory(std::span<const uint32_t> scalars) const override {
@@ -235,6 +225,38 @@ class RefinedSource final : public ForwardingGrid {
  private:
   NodesAround aroundOf(uint32_t block, const NodeBox& box) const {
     return {source().description().blocks.at(block), description_.blocks.at(block), box, parts_[block]};
+  }
+
+  /// How many planes of a box are read at a time, since the grid's nodes around them are in memory besides.
+  uint64_t planesAtATime(uint32_t block, const NodeBox& box) const {
+    constexpr uint64_t kNodes = 1 << 17;  // of the grid
+    const NodeBox around = aroundOf(block, box).box();
+    const uint64_t of_plane = (around.i1 - around.i0) * (around.j1 - around.j0);
+    const uint64_t planes =
+        std::max<uint64_t>(kNodes / of_plane, 4) - 3;  // three are read for the next planes, too
+    return planes * parts_[block][2];
+  }
+
+  /// Reads the nodes of a box to where the arrays of `out` are not filled yet, which is where out.blank ends.
+  void readNext(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                NodeArrays& out) const {
+    const NodesAround around = aroundOf(block, box);
+    NodeArrays grid;
+    ForwardingGrid::read(block, around.box(), scalars, grid);
+    const std::array<PartsBetween, 3>& between = between_[block];
+    const uint64_t ni = description_.blocks[block].ni;
+    size_t at = out.blank.size();
+    forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
+      const PlaceBetween place = around.placeOf(node);
+      out.x[at] = valueAt(grid.x, place, between);
+      out.y[at] = valueAt(grid.y, place, between);
+      out.z[at] = valueAt(grid.z, place, between);
+      for (size_t n = 0; n < scalars.size(); ++n)
+        out.scalars[n][at] =
+            isOfCells(scalars[n]) ? grid.scalars[n][place.at] : valueAt(grid.scalars[n], place, between);
+      ++at;
+    });
+    fillBlanks(around, box, ni, missingOf(scalars, grid), grid.blank, out.blank);
   }
 
   bool isOfCells(uint32_t scalar) const {
@@ -268,11 +290,10 @@ class RefinedSource final : public ForwardingGrid {
                          const std::vector<uint8_t>& missing, const std::vector<uint8_t>& blank,
                          std::vector<uint8_t>& out) {
     if (std::find(missing.begin(), missing.end(), 1) == missing.end()) {
-      out.assign(box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0), 0);
+      out.resize(out.size() + box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0));
       return;
     }
     const std::vector<uint8_t> broken = around.brokenCells(missing);
-    out.clear();
     forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
       const PlaceBetween place = around.placeOf(node);
       out.push_back(place.axes == 0 ? blank[place.at] : !around.isInWhole(node, broken));

@@ -80,7 +80,7 @@ class Columns(MeshFormats):
         drawn = []
         for words, scalar in ((paths, name), ([vtu], "c")):
             cache = self.folder / "b.splats"
-            self.run_program("convert", *words, "-o", cache, "--scalar", scalar, "--refine", "1", "--overwrite")
+            self.run_program("convert", *words, "-o", cache, "--scalar", scalar, "--overwrite")
             result = self.run_program("render", cache, "-o", self.folder / "b.pfm", "--size", "64x64", "--range", "0,1")
             self.assertEqual(result.returncode, 0, result.stderr)
             drawn.append(np.frombuffer((self.folder / "b.pfm").read_bytes().split(b"\n", 3)[3], "<f4"))
@@ -236,7 +236,7 @@ class Columns(MeshFormats):
         info = self.info(self.path)
         self.assertIn("left out: salt, on a structured grid; choose it with --scalar salt", info["warnings"])
         self.assertEqual(info["cells"]["count"], self.LAYERS * len(self.faces))
-        manifest = self.manifest(self.convert([self.path], "salt"))
+        manifest = self.manifest(self.convert([self.path], "salt", "--refine", "1"))
         self.assertEqual([[b["ni"], b["nj"], b["nk"]] for b in manifest["blocks"]], [[5, 4, 3]])
         self.assertAlmostEqual(manifest["variables"][0]["max"], float(values.max()), places=6)
 

@@ -177,6 +177,27 @@ TEST(RefinedSource, DrawsThePartsOfCellsThatAreDrawn) {
       }
 }
 
+TEST(RefinedSource, ReadsLargeBoxesByPlanes) {
+  const std::array<uint32_t, 1> scalar{0};
+  const Refinement cut(std::vector<CellCuts>{{1, 1, 3}});
+  const auto fine = refined(gridWithGone({250, 200, 7}, 77, Gone::kBlanked), cut);
+  const GridBlock& block = fine->description().blocks[0];
+  const NodeArrays whole = allNodes(*fine, 0);
+  ASSERT_EQ(whole.x.size(), block.nodes());
+  NodeArrays plane;
+  for (uint64_t k = 0; k < block.nk; ++k) {
+    fine->read(0, {0, block.nj, k, k + 1}, scalar, plane);
+    const auto expectPart = [&](const auto& part, const auto& of) {
+      EXPECT_TRUE(std::equal(part.begin(), part.end(), of.begin() + static_cast<ptrdiff_t>(k * part.size())))
+          << k;
+    };
+    expectPart(plane.x, whole.x);
+    expectPart(plane.z, whole.z);
+    expectPart(plane.scalars[0], whole.scalars[0]);
+    expectPart(plane.blank, whole.blank);
+  }
+}
+
 TEST(RefinedSource, APartHasTheValueOfItsCell) {
   const Index counts{4, 3, 5};
   const auto grid = unevenGrid(

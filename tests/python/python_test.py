@@ -46,7 +46,7 @@ class PythonTest(unittest.TestCase):
         cls.folder = pathlib.Path(cls.folder_holder.name)
         command("generate", "wake", "--size", "48x40x24", "-o", cls.folder / "wake")
         cls.cache = cls.folder / "wake.splats"
-        curvisplat.convert(cls.cache, cls.folder / "wake.xyz", [cls.folder / "wake.fun"])
+        curvisplat.convert(cls.cache, cls.folder / "wake.xyz", [cls.folder / "wake.fun"], refine=1)
 
     @classmethod
     def tearDownClass(cls):
@@ -410,8 +410,8 @@ class Series(PythonTest):
     def test_of_files_are_those_of_the_command(self):
         command("generate", "wake", "--size", "24x20x12", "--steps", "5", "-o", self.folder / "s")
         theirs, ours = self.folder / "theirs.splats", self.folder / "ours.splats"
-        command("convert", self.folder / "s.xyz", self.folder / "s_*.fun", "--steps", "0:4:2", "-o", theirs)
-        report = curvisplat.convert(ours, self.folder / "s.xyz", self.folder / "s_*.fun", steps="0:4:2")
+        command("convert", self.folder / "s.xyz", self.folder / "s_*.fun", "--steps", "0:4:2", "--refine", "1", "-o", theirs)
+        report = curvisplat.convert(ours, self.folder / "s.xyz", self.folder / "s_*.fun", steps="0:4:2", refine=1)
         self.assertEqual(self.files_of(ours), self.files_of(theirs))
         self.assertEqual((report.steps, report.samples), (3, 24 * 20 * 12))
         self.assertEqual(report.bytes, sum(len(data) for data in self.files_of(ours).values()))

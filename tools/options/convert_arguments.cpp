@@ -25,6 +25,7 @@
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/survey/cell_bends.h"
 #include "stream/base/error.h"
+#include "stream/base/memory.h"
 #include "stream/base/name_list.h"
 #include "stream/base/progress.h"
 #include "stream/cache/series.h"
@@ -283,9 +284,12 @@ std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_
 }
 
 Refinement refinementByNeed(const DataSource& source, unsigned threads) {
-  const ConversionThreads bound(threadsFor(threads));
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
-  return grid ? refinementByNeed(*grid) : Refinement();
+  if (!grid) return {};
+  const ConversionThreads bound(threadsFor(threads));
+  Refinement refinement = refinementByNeed(*grid);
+  returnFreedMemory();
+  return refinement;
 }
 
 std::vector<std::string> notesOnCells(const DataSource& source, const ConvertArguments& arguments) {
