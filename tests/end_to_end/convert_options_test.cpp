@@ -340,8 +340,8 @@ TEST_F(RefineCommand, IndicesAreThoseOfTheFiles) {
     EXPECT_EQ(nodeAt("cut.splats", "5.4,9.6,2.1", more), nodeAt("1.splats", "5.4,9.6,2.1", more));
   }
   const auto picture = [&](const std::string& cache, const std::string& face) {
-    run({"render", file(cache), "-o", file("p.pfm"), "--size", "64x64", "--volume", "off", "--surface",
-         face});
+    run({"render", file(cache), "-o", file("p.pfm"), "--size", "64x64", "--view", "iso", "--volume", "off",
+         "--surface", face});
     return bytesOfFile(file("p.pfm"));
   };
   const std::string of_plane = picture("1.splats", "j=2");
