@@ -209,7 +209,8 @@ DiskNeeds leftOf(const UncheckedConversion& conversion, DiskNeeds needs, const T
   if (!options.ranks->alone())
     needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
   if (options.surfaces)
-    needs.temporary_bytes += temporaryBytesOfFaces(origin.description(), options.planes, options.scalars.size());
+    needs.temporary_bytes +=
+        temporaryBytesOfFaces(origin.description(), options.planes, options.scalars.size());
   needs.cache_bytes -= std::min(needs.cache_bytes, workspace.bytesInPartial());
   return with(temporary, needs);
 }
