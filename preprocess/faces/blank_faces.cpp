@@ -16,7 +16,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr std::array<std::array<size_t, 2>, 3> kAlong{{{1, 2}, {0, 2}, {0, 1}}};
 constexpr size_t kCorners = 4, kKeyDoubles = 3;
 constexpr size_t kRecordSize = kKeyDoubles + 3 * kCorners / 2;  // two coordinates in a double
 constexpr int kCodeBits = 26;
@@ -152,7 +151,7 @@ void BlankFaces::add(const LoadedSlab& loaded, const GridBlock& block, bool of_c
         const bool is_there = isThere(at);
         for (size_t axis = 0; axis < 3; ++axis) {
           if (node[axis] == 0 || isThere(at - stride[axis]) == is_there) continue;
-          const auto [u, v] = kAlong[axis];
+          const auto [u, v] = kFaceAxes[axis];
           const uint64_t number = (node[axis] * size[v] + node[v]) * size[u] + node[u];
           const Quad quad{codeAt(at), codeAt(at + stride[u]), codeAt(at + stride[v]),
                           codeAt(at + stride[u] + stride[v])};

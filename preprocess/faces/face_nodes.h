@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +14,9 @@
 #include "stream/model/grid_faces.h"
 
 namespace curvisplat {
+
+/// [axis] the axes u and v of a face across it.
+inline constexpr std::array<std::array<size_t, 2>, 3> kFaceAxes{{{1, 2}, {0, 2}, {0, 1}}};
 
 /// Whether a cell of cell-centred data is drawn: all corners are there, and it has a value.
 inline bool cellIsThere(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride) {

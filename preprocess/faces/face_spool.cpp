@@ -17,7 +17,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr std::array<std::array<size_t, 2>, 3> kAlong{{{1, 2}, {0, 2}, {0, 1}}};
 constexpr uint64_t kPositionBytes = 3 * sizeof(uint32_t);
 
 using Node = std::array<uint64_t, 3>;
@@ -36,8 +35,8 @@ struct LatticeBox {
     const auto axis = static_cast<size_t>(face.axis);
     empty = layer < from[axis] || layer >= to[axis];
     for (size_t n = 0; n < 2; ++n) {
-      first[n] = from[kAlong[axis][n]];
-      end[n] = to[kAlong[axis][n]];
+      first[n] = from[kFaceAxes[axis][n]];
+      end[n] = to[kFaceAxes[axis][n]];
     }
   }
 };
@@ -46,8 +45,8 @@ Node nodeAt(const GridFace& face, uint64_t layer, uint64_t u, uint64_t v) {
   const auto axis = static_cast<size_t>(face.axis);
   Node node{};
   node[axis] = layer;
-  node[kAlong[axis][0]] = u;
-  node[kAlong[axis][1]] = v;
+  node[kFaceAxes[axis][0]] = u;
+  node[kFaceAxes[axis][1]] = v;
   return node;
 }
 

@@ -4,6 +4,7 @@
 
 #include "preprocess/coincidence/abutting_faces.h"
 #include "preprocess/faces/blank_faces.h"
+#include "preprocess/faces/face_nodes.h"
 #include "preprocess/faces/face_patches.h"
 #include "preprocess/faces/face_spool.h"
 #include "stream/base/error.h"
@@ -13,10 +14,13 @@
 namespace curvisplat {
 namespace {
 
-constexpr std::array<std::array<size_t, 2>, 3> kAlong{{{1, 2}, {0, 2}, {0, 1}}};
-
 std::array<uint64_t, 3> sizeOf(const GridBlock& block) {
   return {block.ni, block.nj, block.nk};
+}
+
+/// The planes of the grid from one index of `plane` to the next.
+uint64_t partsOf(const IndexPlane& plane, const GridDescription& grid, uint32_t block) {
+  return plane.is_of_parts ? 1 : grid.refinement.ofBlock(block)[static_cast<size_t>(plane.axis)];
 }
 
 /// All faces that may be drawn, block after block: blocks without volume have none.
@@ -26,7 +30,7 @@ std::vector<GridFace> facesOf(const GridDescription& grid, std::span<const Index
     const std::array<uint64_t, 3> size = sizeOf(grid.blocks[block]);
     if (std::any_of(size.begin(), size.end(), [](uint64_t n) { return n < 2; })) continue;
     const auto add = [&](int axis, FaceSide side, uint64_t index) {
-      const auto [u, v] = kAlong[static_cast<size_t>(axis)];
+      const auto [u, v] = kFaceAxes[static_cast<size_t>(axis)];
       faces.push_back({block, axis, side, index, {size[u], size[v]}, kNoPatch});
     };
     for (int axis = 0; axis < 3; ++axis) {
@@ -35,7 +39,7 @@ std::vector<GridFace> facesOf(const GridDescription& grid, std::span<const Index
     }
     for (const IndexPlane& plane : planes) {
       const auto axis = static_cast<size_t>(plane.axis);
-      const uint64_t parts = plane.is_of_parts ? 1 : grid.refinement.ofBlock(block)[axis];
+      const uint64_t parts = partsOf(plane, grid, block);
       if (plane.block.value_or(block) == block && plane.index <= (size[axis] - 1) / parts)
         add(plane.axis, FaceSide::kPlane, parts * plane.index);
     }
@@ -55,8 +59,8 @@ std::vector<FaceRegion> regionsOf(const GridDescription& grid, std::span<const G
       FaceRegion region{static_cast<uint32_t>(&face - faces.data()), {}, {}, boundary.name, boundary.type};
       bool is_area = true;
       for (size_t along = 0; along < 2; ++along) {
-        region.first[along] = boundary.first[kAlong[axis][along]];
-        region.last[along] = std::min(boundary.last[kAlong[axis][along]], face.nodes[along] - 1);
+        region.first[along] = boundary.first[kFaceAxes[axis][along]];
+        region.last[along] = std::min(boundary.last[kFaceAxes[axis][along]], face.nodes[along] - 1);
         is_area = is_area && region.first[along] < region.last[along];
       }
       if (is_area) regions.push_back(std::move(region));
@@ -192,8 +196,8 @@ class FacesPass {
     const auto axis = static_cast<size_t>(face.axis);
     CellFace cell{face.block, {}, face.axis, face.side == FaceSide::kMax};
     cell.cell[axis] = face.side == FaceSide::kMax ? face.index - 1 : 0;
-    cell.cell[kAlong[axis][0]] = u;
-    cell.cell[kAlong[axis][1]] = v;
+    cell.cell[kFaceAxes[axis][0]] = u;
+    cell.cell[kFaceAxes[axis][1]] = v;
     return cell;
   }
 
@@ -238,8 +242,7 @@ void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes
     uint64_t last = 0;
     for (uint32_t n = 0; n < grid.blocks.size(); ++n)
       if (plane.block.value_or(n) == n)
-        last = std::max(
-            last, (sizeOf(grid.blocks[n])[a] - 1) / (plane.is_of_parts ? 1 : grid.refinement.ofBlock(n)[a]));
+        last = std::max(last, (sizeOf(grid.blocks[n])[a] - 1) / partsOf(plane, grid, n));
     if (plane.index > last)
       throw Error("--surface: {} {}={}; expected 0 to {}",
                   plane.block ? fmt::format("block {} has no", *plane.block + 1) : "no block has", axis,

@@ -58,7 +58,7 @@ class CameraPath {
   /// Reads the JSON file that tools/REFERENCE.md describes. Throws Error with the file, the key frame and the
   /// field.
   static CameraPath fromFile(const std::filesystem::path& path);
-  /// The same of a file that is parsed already.
+  /// Reads a file that is parsed already, as fromFile().
   static CameraPath fromJson(const JsonField& root, std::string name);
 
   double begin() const { return key_frames_.front().time; }

@@ -232,7 +232,7 @@ TEST_F(GridSurfaceOptions, BlankedCellsEndAtASurface) {
   const Image floor = alone("blanked.splats", "blanks");
   EXPECT_GT(compareImages(floor, alone("cut.splats", "kmin")).psnr_db, 60);
   EXPECT_LT(compareImages(floor, alone("cut.splats", "kmax")).psnr_db, 40);
-  // With the volume, by every painter, and whatever the memory.
+  // Both painters draw them with the volume, with any memory.
   const Words with_volume{"--surface", "blanks", "--surface", "imin", "--surface-by", "s0"};
   const Image cpu = drawn("blanked.splats", Words{"--backend", "cpu"} + with_volume);
   EXPECT_GT(compareImages(cpu, drawn("blanked.splats", Words{"--backend", "osmesa"} + with_volume)).psnr_db,

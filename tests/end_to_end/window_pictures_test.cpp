@@ -242,18 +242,18 @@ TEST_F(WindowMovie, AFilmIsMadePlayedSavedAndDrawnAsRenderDrawsIt) {
   EXPECT_TRUE(hasWidget("film length of 4 s, 101 pictures"));
   click("delete key frame");
   EXPECT_TRUE(eventually([] { return !hasWidget("key frame 3"); }));
-  // By a number, and by the mouse.
-  click("film time");
-  press("ctrl+a");
-  act({"type", "0.4"});
-  press("Return");
+  const auto enterTime = [&](const char* time) {
+    click("film time");
+    press("ctrl+a");
+    act({"type", time});
+    press("Return");
+  };
+  // A number moves the key frame, and so does the mouse.
+  enterTime("0.4");
   placeOf("film length of 0.4 s, 11 pictures");
   drag(1, placeOf("mark of key frame 2"), placeOf("film time line", 0.9));
   EXPECT_TRUE(eventually([] { return !hasWidget("film length of 0.4 s"); }));
-  click("film time");
-  press("ctrl+a");
-  act({"type", "0.2"});
-  press("Return");
+  enterTime("0.2");
   placeOf("film length of 0.2 s, 6 pictures");
   // Selecting shows what the key frame shows; the view that is updated is another one.
   const Image last = save();
