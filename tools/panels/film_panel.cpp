@@ -33,6 +33,19 @@ bool button(const char* text, const char* id, bool enabled, const char* help) {
 
 }  // namespace
 
+/// The line of a film's seconds on the screen, in pixels.
+struct FilmPanel::TimeScale {
+  float left, width, y;
+  float half_mark;
+  double extent;  // seconds of the whole line
+
+  float placeOf(double time) const { return left + width * static_cast<float>(time / extent); }
+  double timeUnderMouse() const {
+    const double share = static_cast<double>((ImGui::GetIO().MousePos.x - left) / width);
+    return std::clamp(share, 0.0, 1.0) * extent;
+  }
+};
+
 void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelActions& actions) {
   FilmActions& does = actions.film;
   const bool has_keys = !film.keys().empty(), selects = film.selected().has_value();
@@ -105,57 +118,55 @@ void FilmPanel::drawPictures(const FilmEdit& film, const FilmPictures& pictures,
   ImGui::PopStyleVar();
 }
 
+bool FilmPanel::drawMark(const FilmEdit& film, size_t n, const TimeScale& scale, FilmActions& actions) {
+  const float half = scale.half_mark, x = scale.placeOf(film.keys()[n].frame.time), y = scale.y;
+  ImGui::SetCursorScreenPos({x - half, y - half});
+  ImGui::PushID(static_cast<int>(film.keys()[n].picture));
+  ImGui::InvisibleButton("mark", {2 * half, 2 * half});
+  ImGui::PopID();
+  nameWidget("mark of " + nameOf(n));
+  const float mouse = ImGui::GetIO().MousePos.x;
+  if (ImGui::IsItemActivated()) {
+    actions.select = n;
+    pressed_x_ = mouse;
+    moves_ = false;
+  }
+  const bool dragging = ImGui::IsItemActive();
+  // The button may have been pressed, moved and released between two frames.
+  if (dragging || ImGui::IsItemDeactivated()) {
+    moves_ |= std::abs(mouse - pressed_x_) >= ImGui::GetIO().MouseDragThreshold;
+    const double frame = std::round(scale.timeUnderMouse() * FilmEdit::kFramesPerSecond);
+    if (moves_) actions.move = {n, frame / FilmEdit::kFramesPerSecond};
+  }
+  const bool marked = n == film.selected() || ImGui::IsItemHovered();
+  ImGui::GetWindowDrawList()->AddQuadFilled({x - half, y}, {x, y - half}, {x + half, y}, {x, y + half},
+                                            marked ? accent() : ImGui::GetColorU32(ImGuiCol_Text));
+  return dragging;
+}
+
 void FilmPanel::drawTimeLine(const FilmEdit& film, PanelActions& actions) {
   const float unit = ImGui::GetFontSize(), half = 0.45f * unit;
-  const float width = ImGui::GetContentRegionAvail().x - 2 * half;
   const ImVec2 corner = ImGui::GetCursorScreenPos();
-  const float y = corner.y + unit, left = corner.x + half;
   // There is space to move the last one; the scale stays while it is moved.
   const double extent = extent_s_.value_or(std::max(2 * FilmEdit::kApart, 1.25 * film.end()));
-  const auto placeOf = [&](double time) { return left + width * static_cast<float>(time / extent); };
-  const auto timeUnderMouse = [&] {
-    const double share = static_cast<double>((ImGui::GetIO().MousePos.x - left) / width);
-    return std::clamp(share, 0.0, 1.0) * extent;
-  };
+  const TimeScale scale{corner.x + half, ImGui::GetContentRegionAvail().x - 2 * half, corner.y + unit, half,
+                        extent};
   ImDrawList* const list = ImGui::GetWindowDrawList();
-  const float line = std::max(1.0f, 0.12f * unit);
-  list->AddLine({left, y}, {left + width, y}, ImGui::GetColorU32(ImGuiCol_FrameBgHovered), line);
-  list->AddLine({left, y}, {placeOf(film.end()), y}, ImGui::GetColorU32(ImGuiCol_TextDisabled), line);
-  const float now = placeOf(film.time());
+  const float line = std::max(1.0f, 0.12f * unit), y = scale.y;
+  list->AddLine({scale.left, y}, {scale.left + scale.width, y}, ImGui::GetColorU32(ImGuiCol_FrameBgHovered),
+                line);
+  list->AddLine({scale.left, y}, {scale.placeOf(film.end()), y}, ImGui::GetColorU32(ImGuiCol_TextDisabled),
+                line);
+  const float now = scale.placeOf(film.time());
   list->AddLine({now, y - 0.8f * unit}, {now, y + 0.8f * unit}, accent(), line);
-  const auto selected = film.selected();
   bool dragging = false;
-  for (size_t n = 0; n < film.keys().size(); ++n) {
-    const FilmEdit::Key& key = film.keys()[n];
-    const float x = placeOf(key.frame.time);
-    ImGui::SetCursorScreenPos({x - half, y - half});
-    ImGui::PushID(static_cast<int>(key.picture));
-    ImGui::InvisibleButton("mark", {2 * half, 2 * half});
-    ImGui::PopID();
-    nameWidget("mark of " + nameOf(n));
-    const float mouse = ImGui::GetIO().MousePos.x;
-    if (ImGui::IsItemActivated()) {
-      actions.film.select = n;
-      pressed_x_ = mouse;
-      moves_ = false;
-    }
-    dragging |= ImGui::IsItemActive();
-    // The button may have been pressed, moved and released between two frames.
-    if (ImGui::IsItemActive() || ImGui::IsItemDeactivated()) {
-      moves_ |= std::abs(mouse - pressed_x_) >= ImGui::GetIO().MouseDragThreshold;
-      const double frame = std::round(timeUnderMouse() * FilmEdit::kFramesPerSecond);
-      if (moves_) actions.film.move = {n, frame / FilmEdit::kFramesPerSecond};
-    }
-    const ImU32 colour =
-        n == selected || ImGui::IsItemHovered() ? accent() : ImGui::GetColorU32(ImGuiCol_Text);
-    list->AddQuadFilled({x - half, y}, {x, y - half}, {x + half, y}, {x, y + half}, colour);
-  }
+  for (size_t n = 0; n < film.keys().size(); ++n) dragging |= drawMark(film, n, scale, actions.film);
   ImGui::SetCursorScreenPos(corner);
-  ImGui::InvisibleButton("time line", {width + 2 * half, 2 * unit});
+  ImGui::InvisibleButton("time line", {scale.width + 2 * half, 2 * unit});
   nameWidget("film time line");
   if (ImGui::IsItemActive()) {
     dragging = true;
-    actions.film.go_to = timeUnderMouse();
+    actions.film.go_to = scale.timeUnderMouse();
   }
   extent_s_ = dragging ? std::optional(extent) : std::nullopt;
   actions.dragging |= dragging;

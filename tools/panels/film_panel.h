@@ -23,8 +23,12 @@ class FilmPanel {
   void draw(const FilmEdit& film, const FilmPictures& pictures, PanelActions& actions);
 
  private:
+  struct TimeScale;
+
   static void drawPictures(const FilmEdit& film, const FilmPictures& pictures, FilmActions& actions);
   void drawTimeLine(const FilmEdit& film, PanelActions& actions);
+  /// The mark of key frame `n`; whether it is being dragged.
+  bool drawMark(const FilmEdit& film, size_t n, const TimeScale& scale, FilmActions& actions);
   void drawTime(const FilmEdit& film, FilmActions& actions);
 
   TypedNumbers typed_;

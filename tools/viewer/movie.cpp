@@ -55,6 +55,87 @@ Image drawWithEnough(FrameRenderer& renderer, const Camera& camera, FrameOptions
   }
 }
 
+/// Draws the frames of a movie, one after another.
+class MovieFrames {
+ public:
+  /// `movie` and `progress` have to outlive it.
+  MovieFrames(MovieRequest& movie, ImageSize size, Progress& progress)
+      : movie_(movie),
+        size_(size),
+        progress_(progress),
+        film_(movie.kind == MovieKind::kFilm ? movie.film.get() : nullptr),
+        state_(movie.state),
+        shown_at_(movie.cache.position()) {
+    movie.cache = movie.cache.atStep(shown_at_.step);
+    if (film_) show(*film_, movie.film_times.front(), state_);
+    options_.memory_bytes = state_.memory_bytes;
+    functions_.emplace(state_, movie.cache.manifest());
+    player_.emplace(movie.cache, functions_->scalars(movie.cache, state_), movie.backend);
+    player_->goTo(shown_at_);
+  }
+
+  Image draw(uint64_t frame) {
+    const Camera camera = goTo(frame);
+    Progress of_frame;
+    of_frame.stopWith(progress_);
+    ShownFrame drawn;
+    drawn.view = player_->renderer().screenView(camera, options_);
+    drawn.data = {movie_.cache.manifest().lower, movie_.cache.manifest().upper};
+    drawn.image = drawWithEnough(player_->renderer(), camera, options_, drawn.statistics, of_frame);
+    const AnnotatedScene shown = sceneOf(state_, *functions_, drawn, size_);
+    return annotated(std::move(drawn.image), state_.annotations, shown);
+  }
+
+ private:
+  /// Sets time, functions and options of a frame; returns its camera.
+  Camera goTo(uint64_t frame) {
+    Camera camera = state_.camera;
+    StepPosition at = shown_at_;
+    if (movie_.kind == MovieKind::kOneTurn) {
+      camera = orbited(camera, 360.0 * static_cast<double>(frame) / static_cast<double>(framesOf(movie_)));
+    } else if (movie_.kind == MovieKind::kAllSteps) {
+      at = {frame};
+    } else if (film_) {
+      const double time = movie_.film_times[frame];
+      show(*film_, time, state_);
+      camera = magnified(state_.camera, movie_.magnification);
+      at = positionOf(*film_, time, movie_.cache.series(), movie_.interpolates).value_or(shown_at_);
+      if (film_->functionsChange()) {
+        functions_.emplace(state_, movie_.cache.manifest());
+        player_->setFunctions(functions_->scalars(movie_.cache, state_));
+      }
+    }
+    player_->goTo(at);
+    if (frame == 0 || film_ || movie_.kind == MovieKind::kAllSteps) setOptions(at.step);
+    return camera;
+  }
+
+  void setOptions(uint64_t step) {
+    const uint64_t memory_bytes = options_.memory_bytes;  // drawWithEnough() may have taken more
+    options_ = state_.frameOptions(dataSizeOf(state_, movie_.cache.manifest(), size_));
+    options_.memory_bytes = memory_bytes;
+    options_.keep_going = movie_.keep_going;
+    if (!movie_.faces_at || !options_.scene || options_.scene->grid_surfaces.empty()) return;
+    if (faces_of_ != step) faces_ = movie_.faces_at(movie_.cache.atStep(step), state_.faceNames());
+    faces_of_ = step;
+    auto found = std::make_shared<SurfaceScene>(*options_.scene);
+    found->grid_surfaces = facesWithLooks(faces_, found->grid_surfaces);
+    options_.scene = std::move(found);
+  }
+
+  MovieRequest& movie_;
+  const ImageSize size_;
+  Progress& progress_;
+  const Film* const film_;
+  ViewState state_;
+  const StepPosition shown_at_;
+  FrameOptions options_;
+  std::optional<uint64_t> faces_of_;  // step
+  std::vector<GridSurface> faces_;
+  std::optional<ShownFunctions> functions_;
+  std::optional<StepPlayer> player_;
+};
+
 }  // namespace
 
 uint64_t framesOf(const MovieRequest& movie) {
@@ -86,61 +167,13 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
   const bool is_picture = movie.kind == MovieKind::kOnePicture;
   const std::filesystem::path file = is_picture ? movie.file : movieNameOf(movie.file);
   const ImageSize size = sizeFor(file, movie.size);
-  ViewState state = movie.state;
-  const StepPosition shown_at = movie.cache.position();
-  movie.cache = movie.cache.atStep(shown_at.step);
   const uint64_t frames = framesOf(movie);
-  const Film* const film = movie.kind == MovieKind::kFilm ? movie.film.get() : nullptr;
-  if (film) show(*film, movie.film_times.front(), state);
-  std::optional<ShownFunctions> functions(std::in_place, state, movie.cache.manifest());
-  FrameOptions options;
-  uint64_t memory_bytes = state.memory_bytes;  // drawWithEnough() may take more
-  std::optional<uint64_t> faces_of;            // step
-  std::vector<GridSurface> faces;
-  const auto take_options = [&](uint64_t step) {
-    options = state.frameOptions(dataSizeOf(state, movie.cache.manifest(), size));
-    options.memory_bytes = memory_bytes;
-    options.keep_going = movie.keep_going;
-    if (!movie.faces_at || !options.scene || options.scene->grid_surfaces.empty()) return;
-    if (faces_of != step) faces = movie.faces_at(movie.cache.atStep(step), state.faceNames());
-    faces_of = step;
-    auto found = std::make_shared<SurfaceScene>(*options.scene);
-    found->grid_surfaces = facesWithLooks(faces, found->grid_surfaces);
-    options.scene = std::move(found);
-  };
+  MovieFrames pictures(movie, size, progress);
   const std::unique_ptr<MovieOutput> output =
       is_picture ? std::make_unique<OnePicture>(file) : open(file, size, movie.frames_per_s);
-  StepPlayer player(movie.cache, functions->scalars(movie.cache, state), movie.backend);
-  player.goTo(shown_at);
   progress.begin("drawing frames", frames, "frames");
   for (uint64_t frame = 0; frame < frames; ++frame) {
-    Camera camera = state.camera;
-    StepPosition at = shown_at;
-    if (movie.kind == MovieKind::kOneTurn) {
-      camera = orbited(camera, 360.0 * static_cast<double>(frame) / static_cast<double>(frames));
-    } else if (movie.kind == MovieKind::kAllSteps) {
-      at = {frame};
-    } else if (film) {
-      const double time = movie.film_times[frame];
-      show(*film, time, state);
-      camera = magnified(state.camera, movie.magnification);
-      at = positionOf(*film, time, movie.cache.series(), movie.interpolates).value_or(shown_at);
-      if (film->functionsChange()) {
-        functions.emplace(state, movie.cache.manifest());
-        player.setFunctions(functions->scalars(movie.cache, state));
-      }
-    }
-    player.goTo(at);
-    if (frame == 0 || film || movie.kind == MovieKind::kAllSteps) take_options(at.step);
-    Progress of_frame;
-    of_frame.stopWith(progress);
-    ShownFrame drawn;
-    drawn.view = player.renderer().screenView(camera, options);
-    drawn.data = {movie.cache.manifest().lower, movie.cache.manifest().upper};
-    drawn.image = drawWithEnough(player.renderer(), camera, options, drawn.statistics, of_frame);
-    memory_bytes = options.memory_bytes;
-    const AnnotatedScene shown = sceneOf(state, *functions, drawn, size);
-    output->write(frame, annotated(std::move(drawn.image), state.annotations, shown));
+    output->write(frame, pictures.draw(frame));
     progress.advance(1);
   }
   output->finish();
