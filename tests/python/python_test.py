@@ -545,7 +545,10 @@ class Arrays(PythonTest):
         x, y, z, t = bent_duct(ni=4)
         path = self.folder / "need.splats"
         block = curvisplat.Block(x, y, z, {"t": t})
-        curvisplat.convert_arrays(path, block, refine="auto")
+        report = curvisplat.convert_arrays(path, block, refine="auto")
+        self.assertRegex(report.notes[0], f"cells .* are cut: {t.size} nodes .*; refine=1 leaves them whole")
+        self.assertEqual(curvisplat.convert_arrays(path, block, refine=1, overwrite=True).notes, [])
+        curvisplat.convert_arrays(path, block, overwrite=True)
         cuts = json.loads((path / "manifest.json").read_text())["blocks"][0]["refined"]
         self.assertGreater(cuts[0], 1)
         self.assertEqual(cuts[1:], [1, 1])

@@ -94,8 +94,8 @@ SeriesOptions seriesOptions(const ConvertArguments& arguments) {
 class StepLog {
  public:
   /// `last`: the last of several steps that are known.
-  explicit StepLog(Progress& progress, std::optional<OpenGridOptions> last = {})
-      : progress_(progress), last_(std::move(last)) {}
+  StepLog(const ConvertArguments& arguments, Progress& progress, std::optional<OpenGridOptions> last = {})
+      : progress_(progress), cuts_by_need_(!arguments.refine), last_(std::move(last)) {}
 
   void add(const SeriesEvent& event) {
     const double now = secondsOf(progress_), seconds = now - before_;
@@ -108,6 +108,8 @@ class StepLog {
     if (event.source && event.converted)
       for (const auto* warnings : {&event.source->warnings, &event.converted->warnings})
         for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
+    if (event.source && event.converted && cuts_by_need_)
+      if (const std::string note = noteOnCuts(*event.source); !note.empty()) printMessage("note: {}", note);
     if (event.source && event.converted && last_)
       if (const std::string note = noteOnLaterScalars(*event.source, *last_); !note.empty())
         printMessage("warning: {}", note);
@@ -126,6 +128,7 @@ class StepLog {
 
  private:
   Progress& progress_;
+  bool cuts_by_need_;  // without being asked to
   std::optional<OpenGridOptions> last_;
   nlohmann::json steps_ = nlohmann::json::array();
   uint64_t bytes_ = 0;
@@ -137,7 +140,7 @@ void follow(const ConvertArguments& arguments) {
   SeriesOptions options = seriesOptions(arguments);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
-  StepLog log(progress);
+  StepLog log(arguments, progress);
   FolderEvents events(foldersOf(arguments.grid));
   WrittenFiles files(arguments.grid);
   uint64_t steps = 0;
@@ -205,7 +208,7 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
     makePartsFolder(folder);
     writePartRecord(folder, part, steps.size(), {});
     Progress nothing;
-    writeSeriesStatistics(arguments, {}, StepLog(nothing), nothing);
+    writeSeriesStatistics(arguments, {}, StepLog(arguments, nothing), nothing);
     printLine("{}: no steps in this part", folder.string());
     return;
   }
@@ -223,7 +226,7 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   };
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
-  StepLog log(progress);
+  StepLog log(arguments, progress);
   const SeriesReport report = [&] {
     try {
       return convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
@@ -291,7 +294,7 @@ void runConvertSeries(ConvertArguments arguments) {
   const StopOnSignals stopping(progress);
   const StopRanksWith stopping_ranks(ranks, progress);
   const bool names_scalars = !arguments.scalars.empty() || arguments.adds_steps;
-  StepLog log(progress,
+  StepLog log(arguments, progress,
               names_scalars || steps.size() < 2 ? std::nullopt : std::optional(steps.back().options));
   const SeriesReport report =
       convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });

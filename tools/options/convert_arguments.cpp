@@ -292,25 +292,26 @@ Refinement refinementByNeed(const DataSource& source, unsigned threads) {
   return refinement;
 }
 
+std::string noteOnCuts(const GridDescription& description, std::string_view how_to_avoid) {
+  if (!description.refinement.cutsCells()) return {};
+  uint64_t nodes = 0, in_files = 0;
+  for (size_t n = 0; n < description.blocks.size(); ++n) {
+    const GridBlock& block = description.blocks[n];
+    const auto [i, j, k] = description.refinement.nodeInFiles(n, {block.ni - 1, block.nj - 1, block.nk - 1});
+    nodes += block.nodes();
+    in_files += (i + 1) * (j + 1) * (k + 1);
+  }
+  return fmt::format(
+      "cells that bend or grow steeply are cut: {} nodes of the files become {}; {} leaves them whole",
+      in_files, nodes, how_to_avoid);
+}
+
 std::vector<std::string> notesOnCells(const DataSource& source, const ConvertArguments& arguments) {
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   if (!grid) return {};
   std::vector<std::string> notes;
-  const GridDescription& description = grid->description();
-  if (description.refinement.cutsCells() && !arguments.refine) {
-    uint64_t nodes = 0, in_files = 0;
-    for (size_t n = 0; n < description.blocks.size(); ++n) {
-      const GridBlock& block = description.blocks[n];
-      const auto [i, j, k] =
-          description.refinement.nodeInFiles(n, {block.ni - 1, block.nj - 1, block.nk - 1});
-      nodes += block.nodes();
-      in_files += (i + 1) * (j + 1) * (k + 1);
-    }
-    notes.push_back(
-        fmt::format("cells that bend or grow steeply are cut: {} nodes of the files become {}; --refine 1 "
-                    "leaves them whole",
-                    in_files, nodes));
-  }
+  if (!arguments.refine)
+    if (std::string note = noteOnCuts(grid->description()); !note.empty()) notes.push_back(std::move(note));
   const ConversionThreads bound(threadsFor(arguments.threads));
   if (std::string note = noteOnCells(*grid, arguments.refine.value_or(kByNeed) == kByNeed); !note.empty())
     notes.push_back(std::move(note));

@@ -204,7 +204,13 @@ ConvertOptions convertOptions(const std::filesystem::path& output, const py::dic
   return options;
 }
 
-py::dict reportOf(const ConvertReport& report) {
+/// What a conversion did to the cells without having been asked to, for the report.
+std::vector<std::string> notesOn(const GridDescription& description, bool cuts_by_need) {
+  const std::string note = cuts_by_need ? noteOnCuts(description, "refine=1") : "";
+  return note.empty() ? std::vector<std::string>{} : std::vector{note};
+}
+
+py::dict reportOf(const ConvertReport& report, const std::vector<std::string>& notes) {
   py::dict out;
   out["samples"] = report.nodes;
   out["blanked"] = report.blanked.by_grid + report.blanked.by_value + report.blanked.not_finite;
@@ -217,6 +223,7 @@ py::dict reportOf(const ConvertReport& report) {
   for (const FileReport& file : report.files) bytes += file.bytes;
   out["bytes"] = bytes;
   out["warnings"] = report.warnings;
+  out["notes"] = notes;
   out["steps"] = 1;
   return out;
 }
@@ -227,12 +234,13 @@ void beginThreads(unsigned count) {
   requireThreads(count, kThreads);
 }
 
-py::dict convertSource(const DataSource& source, ConvertOptions options, const py::object& progress) {
+py::dict convertSource(const DataSource& source, ConvertOptions options, const py::dict& given_options,
+                       const py::object& progress) {
   options.differing = DifferingScalars::kKeepApart;
   ConvertReport report;
   beginThreads(options.threads);
   runInterruptibly(progress, [&](Progress& of_work) { report = convert(source, options, of_work); });
-  return reportOf(report);
+  return reportOf(report, notesOn(source.description(), refinementOf(given_options) == "auto"));
 }
 
 std::vector<uint32_t> allScalars(const ScalarNames& names) {
@@ -262,7 +270,7 @@ py::dict convertArrays(const std::filesystem::path& output, const py::list& bloc
   const auto source =
       refinedAs(given_options, sourceOf(blocks, names, given_options), options.blank_value, progress);
   options.time = py::cast<std::optional<double>>(given_options["time"]);
-  return convertSource(*source, std::move(options), progress);
+  return convertSource(*source, std::move(options), given_options, progress);
 }
 
 /// The steps that the cache has then.
@@ -297,7 +305,7 @@ py::dict convertCallable(const std::filesystem::path& output,
   beginThreads(options.threads);
   const auto source =
       refinedAs(given_options, sourceOfCallable(shapes, names, {read, parts}), options.blank_value, progress);
-  return convertSource(*source, std::move(options), progress);
+  return convertSource(*source, std::move(options), given_options, progress);
 }
 
 /// The steps of the files that "steps" leaves, or none where they are one.
@@ -319,12 +327,13 @@ py::dict convertSteps(const ConvertArguments& arguments, const std::vector<StepF
   const SeriesInput input = seriesInput(arguments, steps);
   SeriesReport series;
   ConvertReport first;
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings, notes;
   beginThreads(options.convert.threads);
   runInterruptibly(progress, [&](Progress& of_work) {
     series = convertSeries(input, options, of_work, [&](const SeriesEvent& event) {
       if (!event.reason.empty()) warnings.push_back(event.name + " was left out: " + event.reason);
       if (event.converted) first = *event.converted;
+      if (event.source && event.converted) notes = notesOn(*event.source, arguments.refine == "auto");
       if (event.source)
         warnings.insert(warnings.end(), event.source->warnings.begin(), event.source->warnings.end());
     });
@@ -334,7 +343,7 @@ py::dict convertSteps(const ConvertArguments& arguments, const std::vector<StepF
   for (const auto& entry : std::filesystem::recursive_directory_iterator(options.convert.output))
     if (entry.is_regular_file()) bytes += entry.file_size();
   first.warnings.insert(first.warnings.end(), warnings.begin(), warnings.end());
-  py::dict out = reportOf(first);
+  py::dict out = reportOf(first, notes);
   out["samples"] = cache.manifest().nodes;
   out["splats"] = cache.manifest().splats;
   out["bricks"] = cache.bricks().size();
@@ -367,6 +376,7 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
   if (options.title.empty()) options.title = arguments.grid.grid.stem().string();
   if (!steps.empty()) return convertSteps(arguments, steps, std::move(options), progress);
   ConvertReport report;
+  std::vector<std::string> notes;
   beginThreads(options.threads);
   runInterruptibly(progress, [&](Progress& of_work) {
     const auto source = openSource(arguments, options.output);
@@ -374,8 +384,9 @@ py::dict convertFiles(const std::filesystem::path& output, const std::filesystem
     options.differing = DifferingScalars::kKeepApart;
     report = convert(*source, options, of_work);
     for (const std::string& warning : source->description().warnings) report.warnings.push_back(warning);
+    notes = notesOn(source->description(), arguments.refine == "auto");
   });
-  return reportOf(report);
+  return reportOf(report, notes);
 }
 
 using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;

@@ -17,7 +17,7 @@ Progress = Callable[[str, int, int, str], None]
 
 class Report(NamedTuple):
     """What a conversion did. `samples`: nodes or cells of the grid, `blanked` of which are not drawn; `volume`: of the cells; `steps`
-    of the cache. Of a series `blanked`, `merged_nodes` and the rest are of its first step, `bytes` of all."""
+    of the cache; `notes`: what was done to the cells without being asked for. Of a series `blanked`, `merged_nodes` and the rest are of its first step, `bytes` of all."""
 
     samples: int
     blanked: int
@@ -29,6 +29,7 @@ class Report(NamedTuple):
     bytes: int
     warnings: Sequence[str]
     steps: int = 1
+    notes: Sequence[str] = ()
 
 
 def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory: Union[str, int, None], threads: int,
