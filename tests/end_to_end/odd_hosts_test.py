@@ -303,6 +303,11 @@ class OddHosts(unittest.TestCase):
         self.assertEqual(hashes, self.expected[0])
         self.assertEqual(said, self.expected[1])
 
+    def test_starts_without_the_libraries_of_its_plug_ins(self):
+        linked = subprocess.run(["ldd", PROGRAM], capture_output=True, text=True, check=True).stdout
+        for library in ("hdf5", "netcdf", "cgns", "proj", "openvdb", "mpi", "curl"):
+            self.assertNotIn(f"lib{library}", linked)
+
     def test_locales(self):
         if not shutil.which("localedef"):
             self.skipTest("no localedef")

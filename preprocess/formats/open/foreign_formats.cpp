@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/hdf5_library.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/openfoam/foam_source.h"
 #include "stream/base/error.h"
