@@ -182,9 +182,9 @@ void endRanksAfter(const std::string& line, int status) {
     muteMessages(false);
     printMessage("rank {} of {} ({}): {}", started->rank(), started->count(), hostName(), line);
   }
-  // The others see the announcement and remove their files; whoever does not in this time is ended by a signal. The
-  // one that prints ends the job: those that are silent wait for it.
-  started->waitForFailures(5s);
+  // The others see the announcement and remove their files; whoever does not in this time, which is long enough for a
+  // machine with much other work, is ended by a signal. The one that prints ends the job: those that are silent wait for it.
+  started->waitForFailures(20s);
   if (silent) std::this_thread::sleep_for(2s);
   transport.abort(status);
 }
