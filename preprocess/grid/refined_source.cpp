@@ -36,9 +36,34 @@ GridBlock refinedBlock(const GridBlock& block, const CellCuts& parts) {
 }
 
 /// The planes of the grid around the refined ones from begin to end: with those before and behind a plane of the grid
-/// itself, since the cells on both of its sides decide whether a node is blanked.
-std::pair<uint64_t, uint64_t> planesAround(uint64_t begin, uint64_t end, uint64_t count, uint32_t parts) {
+/// itself, since the cells on both of its sides decide whether a node is blanked; for the values of cells with those of two
+/// cells on each side.
+std::pair<uint64_t, uint64_t> planesAround(uint64_t begin, uint64_t end, uint64_t count, uint32_t parts,
+                                           bool for_cells) {
+  if (for_cells) return {std::max<uint64_t>(begin / parts, 2) - 2, std::min((end - 1) / parts + 3, count)};
   return {(std::max<uint64_t>(begin, 1) - 1) / parts, std::min((end - 1) / parts + 2, count)};
+}
+
+/// A cell and one beside it: the difference of their values, away from the cell, and the change within the cell that this is,
+/// since the cells may differ in length.
+struct CellStep {
+  double difference = 0, change = 0;
+};
+
+/// How much a cell's value changes from its one side to the other, by the steps to the cells before and after it: no part of
+/// the cell is then beyond these two (the monotonized central limiter of van Leer 1977).
+double changeBetween(const CellStep& before, const CellStep& after) {
+  if (!(before.difference * after.difference < 0)) return 0;
+  const double most = 2 * std::min(std::abs(before.difference), std::abs(after.difference));
+  return std::copysign(std::min(0.5 * std::abs(after.change - before.change), most), after.difference);
+}
+
+/// The same at a border, by the step away from it and the further difference, to the second cell: none unless both have one
+/// sign; and no part of the cell has another sign than `value`.
+double changeAtBorder(double value, const CellStep& step, double further) {
+  if (!(step.difference * further > 0)) return 0;
+  return std::copysign(std::min({std::abs(step.change), 2 * std::abs(further), 2 * std::abs(value)}),
+                       step.difference);
 }
 
 /// Interpolation by the parts of a cell: exact where both ends are equal, and the same from either end.
@@ -98,11 +123,12 @@ double valueBetween(const Value* values, const PlaceBetween& place,
 /// The nodes of the grid around a box of refined ones, and the way from the refined indices into their arrays.
 class NodesAround {
  public:
-  NodesAround(const GridBlock& grid, const GridBlock& refined, const NodeBox& box, const CellCuts& parts)
+  NodesAround(const GridBlock& grid, const GridBlock& refined, const NodeBox& box, const CellCuts& parts,
+              bool for_cells)
       : parts_{parts[0], parts[1], parts[2]} {
-    std::tie(box_.i0, box_.i1) = planesAround(box.i0, box.endOfRow(refined.ni), grid.ni, parts[0]);
-    std::tie(box_.j0, box_.j1) = planesAround(box.j0, box.j1, grid.nj, parts[1]);
-    std::tie(box_.k0, box_.k1) = planesAround(box.k0, box.k1, grid.nk, parts[2]);
+    std::tie(box_.i0, box_.i1) = planesAround(box.i0, box.endOfRow(refined.ni), grid.ni, parts[0], for_cells);
+    std::tie(box_.j0, box_.j1) = planesAround(box.j0, box.j1, grid.nj, parts[1], for_cells);
+    std::tie(box_.k0, box_.k1) = planesAround(box.k0, box.k1, grid.nk, parts[2], for_cells);
     first_ = {box_.i0, box_.j0, box_.k0};
     counts_ = {box_.i1 - box_.i0, box_.j1 - box_.j0, box_.k1 - box_.k0};
     strides_ = {1, counts_[0], counts_[0] * counts_[1]};
@@ -135,6 +161,28 @@ class NodesAround {
     return missing;
   }
 
+  /// The value of the part of a cell whose lowest node is the refined `node`. A cell's value is that of its middle, and the mean
+  /// of its parts. `isThere(cell)`: whether a cell has a value, by its lowest node.
+  template <typename IsThere>
+  float valueOfPart(const NodeArrays& grid, const std::vector<float>& values,
+                    const std::array<uint64_t, 3>& node, const IsThere& isThere) const {
+    std::array<size_t, 3> planes{};
+    size_t at = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      planes[axis] = node[axis] / parts_[axis] - first_[axis];
+      at += planes[axis] * strides_[axis];
+    }
+    if (!isThere(at)) return values[at];
+    double sum = values[at];
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (parts_[axis] == 1) continue;
+      const auto parts = static_cast<double>(parts_[axis]);
+      const double share = (static_cast<double>(2 * (node[axis] % parts_[axis]) + 1) - parts) / (2 * parts);
+      sum += share * changeAlong(axis, grid, values, {at, planes[axis]}, isThere);
+    }
+    return static_cast<float>(sum);
+  }
+
   /// Whether one of the cells that a refined node lies in, or on the border of, is whole.
   bool isInWhole(const std::array<uint64_t, 3>& node, const std::vector<uint8_t>& broken) const {
     size_t at = 0;
@@ -152,6 +200,40 @@ class NodesAround {
   }
 
  private:
+  /// How much the value of the cell changes along an axis, from its one side to the other. `cell`: its lowest node and the
+  /// plane of that across the axis.
+  template <typename IsThere>
+  double changeAlong(size_t axis, const NodeArrays& grid, const std::vector<float>& values,
+                     const std::pair<size_t, size_t>& cell, const IsThere& isThere) const {
+    const auto [at, plane] = cell;
+    const size_t stride = strides_[axis], count = counts_[axis];
+    if (plane + 1 >= count) return 0;
+    const bool before = plane > 0 && isThere(at - stride);
+    const bool after = plane + 2 < count && isThere(at + stride);
+    if (before && after)
+      return changeBetween(stepTo(at - stride, at, stride, grid, values),
+                           stepTo(at + stride, at, stride, grid, values));
+    if (after && plane + 2 < count && isThere(at + 2 * stride))
+      return changeAtBorder(values[at], stepTo(at + stride, at, stride, grid, values),
+                            double{values[at + 2 * stride]} - values[at + stride]);
+    if (before && plane > 1 && isThere(at - 2 * stride))
+      return -changeAtBorder(values[at], stepTo(at - stride, at, stride, grid, values),
+                             double{values[at - 2 * stride]} - values[at - stride]);
+    return 0;
+  }
+
+  static CellStep stepTo(size_t other, size_t cell, size_t stride, const NodeArrays& grid,
+                         const std::vector<float>& values) {
+    // The edges at the lowest nodes stand for the cells: what counts is how they grow.
+    const auto length = [&](size_t node) {
+      return std::hypot(grid.x[node + stride] - grid.x[node], grid.y[node + stride] - grid.y[node],
+                        grid.z[node + stride] - grid.z[node]);
+    };
+    const double difference = double{values[other]} - values[cell];
+    const double own = length(cell), both = own + length(other);
+    return {difference, own > 0 && both > own ? difference * 2 * own / both : difference};
+  }
+
   std::array<uint64_t, 3> parts_;
   NodeBox box_;
   std::array<uint64_t, 3> first_{}, counts_{}, strides_{};
@@ -208,7 +290,7 @@ class RefinedSource final : public ForwardingGrid {
   }
 
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
-    const NodesAround around = aroundOf(block, box);
+    const NodesAround around = aroundOf(block, box, false);
     std::vector<uint8_t> grid;
     if (!source().readFringePart(block, around.box(), grid)) return false;
     out.clear();
@@ -223,28 +305,32 @@ class RefinedSource final : public ForwardingGrid {
   }
 
  private:
-  NodesAround aroundOf(uint32_t block, const NodeBox& box) const {
-    return {source().description().blocks.at(block), description_.blocks.at(block), box, parts_[block]};
+  NodesAround aroundOf(uint32_t block, const NodeBox& box, bool for_cells) const {
+    return {source().description().blocks.at(block), description_.blocks.at(block), box, parts_[block],
+            for_cells};
   }
 
   /// How many planes of a box are read at a time, since the grid's nodes around them are in memory besides.
   uint64_t planesAtATime(uint32_t block, const NodeBox& box) const {
     constexpr uint64_t kNodes = 1 << 17;  // of the grid
-    const NodeBox around = aroundOf(block, box).box();
+    const NodeBox around = aroundOf(block, box, true).box();
     const uint64_t of_plane = (around.i1 - around.i0) * (around.j1 - around.j0);
     const uint64_t planes =
-        std::max<uint64_t>(kNodes / of_plane, 4) - 3;  // three are read for the next planes, too
+        std::max<uint64_t>(kNodes / of_plane, 6) - 5;  // five are read for the next planes, too
     return planes * parts_[block][2];
   }
 
   /// Reads the nodes of a box to where the arrays of `out` are not filled yet, which is where out.blank ends.
   void readNext(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                 NodeArrays& out) const {
-    const NodesAround around = aroundOf(block, box);
+    const bool has_cells =
+        std::any_of(scalars.begin(), scalars.end(), [&](uint32_t n) { return isOfCells(n); });
+    const NodesAround around = aroundOf(block, box, has_cells);
     NodeArrays grid;
     ForwardingGrid::read(block, around.box(), scalars, grid);
     const std::array<PartsBetween, 3>& between = between_[block];
     const uint64_t ni = description_.blocks[block].ni;
+    const std::vector<uint8_t> broken = brokenCells(around, missingOf(scalars, grid));
     size_t at = out.blank.size();
     forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
       const PlaceBetween place = around.placeOf(node);
@@ -253,10 +339,18 @@ class RefinedSource final : public ForwardingGrid {
       out.z[at] = valueAt(grid.z, place, between);
       for (size_t n = 0; n < scalars.size(); ++n)
         out.scalars[n][at] =
-            isOfCells(scalars[n]) ? grid.scalars[n][place.at] : valueAt(grid.scalars[n], place, between);
+            isOfCells(scalars[n])
+                ? around.valueOfPart(grid, grid.scalars[n], node,
+                                     [&](size_t cell) { return isThere(grid.scalars[n], cell, broken); })
+                : valueAt(grid.scalars[n], place, between);
       ++at;
     });
-    fillBlanks(around, box, ni, missingOf(scalars, grid), grid.blank, out.blank);
+    fillBlanks(around, box, ni, broken, grid.blank, out.blank);
+  }
+
+  /// Whether a cell has a value; `cell` is its lowest node.
+  bool isThere(const std::vector<float>& values, size_t cell, const std::vector<uint8_t>& broken) const {
+    return std::isfinite(values[cell]) && values[cell] != blank_value_ && (broken.empty() || !broken[cell]);
   }
 
   bool isOfCells(uint32_t scalar) const {
@@ -286,14 +380,19 @@ class RefinedSource final : public ForwardingGrid {
     return missing;
   }
 
+  /// NodesAround::brokenCells(), but empty if no node is missing.
+  static std::vector<uint8_t> brokenCells(const NodesAround& around, std::vector<uint8_t> missing) {
+    if (std::find(missing.begin(), missing.end(), 1) == missing.end()) return {};
+    return around.brokenCells(std::move(missing));
+  }
+
   static void fillBlanks(const NodesAround& around, const NodeBox& box, uint64_t ni,
-                         const std::vector<uint8_t>& missing, const std::vector<uint8_t>& blank,
+                         const std::vector<uint8_t>& broken, const std::vector<uint8_t>& blank,
                          std::vector<uint8_t>& out) {
-    if (std::find(missing.begin(), missing.end(), 1) == missing.end()) {
+    if (broken.empty()) {
       out.resize(out.size() + box.rowNodes(ni) * (box.j1 - box.j0) * (box.k1 - box.k0));
       return;
     }
-    const std::vector<uint8_t> broken = around.brokenCells(missing);
     forEachNode(box, ni, [&](const std::array<uint64_t, 3>& node) {
       const PlaceBetween place = around.placeOf(node);
       out.push_back(place.axes == 0 ? blank[place.at] : !around.isInWhole(node, broken));

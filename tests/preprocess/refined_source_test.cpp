@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
@@ -198,33 +199,77 @@ TEST(RefinedSource, ReadsLargeBoxesByPlanes) {
   }
 }
 
-TEST(RefinedSource, APartHasTheValueOfItsCell) {
-  const Index counts{4, 3, 5};
-  const auto grid = unevenGrid(
-      counts,
-      [](const GridNode& node, NodeValues& values) {
-        if (node.i == 3 || node.j == 2 || node.k == 4 || node.i + node.j + node.k == 2)
-          values.scalars[0] = kNone;
+/// Cells that grow by 1.4 along i, 1 long along j and k; `valueOf(i, j, k)` of those but the last along each axis.
+std::unique_ptr<GridSource> growingCells(const std::function<double(const Index&)>& valueOf) {
+  return std::make_unique<FunctionGridSource>(
+      std::vector{gridBlock(9, 4, 5)}, 1,
+      [=](const GridNode& node) {
+        NodeValues values;
+        values.position = {std::pow(1.4, node.i), node.j, node.k};
+        const bool is_cell = node.i < 8 && node.j < 3 && node.k < 4;
+        values.scalars = {is_cell ? static_cast<float>(valueOf({node.i, node.j, node.k})) : kNone};
+        return values;
       },
       Centring::kCell);
-  const auto fine =
-      refined(unevenGrid(
-                  counts,
-                  [](const GridNode& node, NodeValues& values) {
-                    if (node.i == 3 || node.j == 2 || node.k == 4 || node.i + node.j + node.k == 2)
-                      values.scalars[0] = kNone;
-                  },
-                  Centring::kCell),
-              3);
-  const NodeArrays before = allNodes(*grid, 0), nodes = allNodes(*fine, 0);
+}
+
+double middleOf(uint64_t i) {
+  const auto n = static_cast<double>(i);
+  return 0.5 * (std::pow(1.4, n) + std::pow(1.4, n + 1));
+}
+
+TEST(RefinedSource, PartsOfCellsFollowALinearField) {
+  const auto field = [](double x, double y, double z) { return 2 * x - 3 * y + z + 20; };
+  const auto fine = refined(growingCells([&](const Index& n) {
+                              return field(middleOf(n[0]), static_cast<double>(n[1]) + 0.5,
+                                           static_cast<double>(n[2]) + 0.5);
+                            }),
+                            Refinement(std::vector<CellCuts>{{2, 1, 4}}));
+  const NodeArrays nodes = allNodes(*fine, 0);
   const GridBlock& block = fine->description().blocks[0];
   forEachIndex(block, [&](const Index& n) {
-    const float expected =
-        before.scalars[0][atOf(grid->description().blocks[0], {n[0] / 3, n[1] / 3, n[2] / 3})];
-    const float found = nodes.scalars[0][atOf(block, n)];
-    EXPECT_TRUE(found == expected || (std::isnan(found) && std::isnan(expected)));
-    EXPECT_EQ(nodes.blank[atOf(block, n)], 0) << "a cell without a value blanks no nodes";
+    if (n[0] + 1 == block.ni || n[1] + 1 == block.nj || n[2] + 1 == block.nk) return;
+    const size_t at = atOf(block, n);
+    const double x = 0.5 * (nodes.x[at] + nodes.x[at + 1]);
+    const double expected = field(x, static_cast<double>(n[1]) + 0.5, (static_cast<double>(n[2]) + 0.5) / 4);
+    EXPECT_NEAR(nodes.scalars[0][at], expected, 1e-4) << n[0] << ' ' << n[1] << ' ' << n[2];
   });
+}
+
+TEST(RefinedSource, PartsOfCellsHaveItsMeanAndNoNewExtremes) {
+  const std::array<double, 8> values{100, 0, 0, 1e6, 2e6, 1, -5, -5};  // a value of a border, and steps
+  const auto fine = refined(growingCells([&](const Index& n) { return values[n[0]]; }), 4);
+  const NodeArrays nodes = allNodes(*fine, 0);
+  for (size_t i = 0; i < values.size(); ++i) {
+    double sum = 0;
+    for (size_t part = 0; part < 4; ++part) {
+      const double value = nodes.scalars[0][4 * i + part];
+      sum += value / 4;
+      double least = values[i], most = values[i];
+      for (const size_t beside : {i - std::min<size_t>(i, 1), std::min<size_t>(i + 1, 7)}) {
+        least = std::min(least, values[beside]);
+        most = std::max(most, values[beside]);
+      }
+      EXPECT_GE(value, least) << i;
+      EXPECT_LE(value, most) << i;
+    }
+    EXPECT_NEAR(sum, values[i], 1e-6 * 2e6) << i;
+  }
+}
+
+TEST(RefinedSource, PartsOfCellsLeaveOutWhatHasNoValue) {
+  // Beside a cell without a value and one that is infinite, as at a border: the cells' values as far as these.
+  const auto fine = refined(growingCells([&](const Index& n) {
+                              if (n[0] == 4) return static_cast<double>(kNone);
+                              return n[0] == 0 ? std::numeric_limits<double>::infinity() : middleOf(n[0]);
+                            }),
+                            Refinement(std::vector<CellCuts>{{2, 1, 1}}));
+  const NodeArrays nodes = allNodes(*fine, 0);
+  EXPECT_TRUE(std::isinf(nodes.scalars[0][0]) && std::isinf(nodes.scalars[0][1]));
+  EXPECT_TRUE(std::isnan(nodes.scalars[0][8]) && std::isnan(nodes.scalars[0][9]));
+  for (const size_t n : {2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15})
+    EXPECT_NEAR(nodes.scalars[0][n], 0.5 * (nodes.x[n] + nodes.x[n + 1]), 1e-4) << n;
+  EXPECT_EQ(nodes.blank[0], 0) << "a cell without a value blanks no nodes";
   expectPartsOfRows(*fine);
 }
 
