@@ -171,6 +171,25 @@ TEST_F(BackgroundJobTest, EndsWhenItIsStopped) {
   EXPECT_TRUE(interrupted);
 }
 
+/// Pictures of a movie are counted for the user, bytes of a conversion are not.
+TEST_F(BackgroundJobTest, CountsPictures) {
+  const auto phaseOf = [](const char* phase, uint64_t total, const char* unit) {
+    BackgroundJob job(
+        "job", "beginning",
+        [=](Progress& progress) {
+          progress.begin(phase, total, unit);
+          progress.advance(std::min<uint64_t>(total, 12));
+          return std::filesystem::path("done");
+        },
+        nobody);
+    EXPECT_TRUE(eventually([&] { return job.isDone(); }));
+    return job.phase();
+  };
+  EXPECT_EQ(phaseOf("drawing frames", 90, "frames"), "drawing frames, 12 of 90");
+  EXPECT_EQ(phaseOf("drawing frames", 1, "frames"), "drawing frames");
+  EXPECT_EQ(phaseOf("sorting splats", 90, "splats"), "sorting splats");
+}
+
 TEST_F(BackgroundJobTest, AnOpeningHandsOnWhatItIsTold) {
   Opening opening(
       "opening a.xyz",

@@ -1,5 +1,6 @@
 #include "tools/view/background_jobs.h"
 
+#include <fmt/format.h>
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
@@ -21,6 +22,7 @@
 namespace curvisplat {
 namespace {
 
+constexpr const char* kFramesUnit = "frames";
 constexpr int kNice = 10;  // the window and its picture come first
 
 /// Calls it at the end of its lifetime.
@@ -103,8 +105,10 @@ BackgroundJob::BackgroundJob(std::string title, std::string phase, Work work, vo
         if (!state) return;
         {
           const MutexLock lock(mutex_);
-          phase_ = state->phase;
           const uint64_t done = state->done + state->skipped;
+          // People count pictures, and neither bytes nor splats.
+          const bool counts = state->unit == kFramesUnit && state->total > 1;
+          phase_ = state->phase + (counts ? fmt::format(", {} of {}", done, state->total) : "");
           part_ = state->total > 0 ? static_cast<float>(done) / static_cast<float>(state->total) : 0;
         }
         wake();

@@ -78,7 +78,8 @@ class BackgroundJob {
   BackgroundJob& operator=(const BackgroundJob&) = delete;
 
   const std::string& title() const { return title_; }
-  /// The current phase: "sorting splats"; and the part of it that is done, 0 if that is not known.
+  /// The current phase: "sorting splats", or with its pictures "drawing frames, 12 of 90"; and the part of it that is
+  /// done, 0 if that is not known.
   std::string phase() const;
   float part() const;
   bool isDone() const;
