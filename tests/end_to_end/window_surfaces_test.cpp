@@ -1,4 +1,6 @@
 // Surfaces in the window: faces of the grid, files, isosurfaces.
+#include <cmath>
+#include <string>
 #include <utility>
 
 #include "tests/end_to_end/window_fixture.h"
@@ -128,6 +130,10 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
   const auto commands = close();
   ASSERT_EQ(commands.size(), 5u);
   EXPECT_NE(valueOf(commands[0], "--iso"), valueOf(commands[1], "--iso"));
+  // It begins where half of what is seen is on either side, and not in the middle of the range.
+  const std::string range = valueOf(commands[0], "--range");
+  const double low = std::stod(range), high = std::stod(range.substr(range.find(',') + 1));
+  EXPECT_GT(std::abs(std::stod(valueOf(commands[0], "--iso")) - 0.5 * (low + high)), 0.01 * (high - low));
   EXPECT_EQ(valueOf(commands[2], "--iso"), "");
   EXPECT_EQ(valueOf(commands[3], "--iso-by"), "f");
   EXPECT_EQ(valueOf(commands[4], "--iso-by"), "");

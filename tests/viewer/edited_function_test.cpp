@@ -86,6 +86,20 @@ TEST(EditedFunction, ChangesMakeItNoPreset) {
   EXPECT_EQ(edited.preset(), "");
 }
 
+/// Of an even histogram and opacities that rise as x, the share below x is x squared.
+TEST(EditedFunction, AnIsosurfaceBeginsInTheMiddleOfWhatIsSeen) {
+  EditedFunction function("viridis", 10, 20, 1);
+  function.setOpacities({{0, 0}, {1, 1}});
+  const std::vector<double> even(500, 1.0 / 500);
+  EXPECT_NEAR(middleOfSeen(even, function), 10 + 10 * std::sqrt(0.5), 1e-3);
+  function.setOpacities({{0, 0}, {1, 0}});
+  EXPECT_NEAR(middleOfSeen(even, function), 15, 1e-9);
+  EXPECT_NEAR(middleOfSeen({}, function), 15, 1e-9);
+  EXPECT_NEAR(middleOfSeen({0, 0, 0}, function), 15, 1e-9);
+  // All of the volume in the second of four bins.
+  EXPECT_NEAR(middleOfSeen({0, 1, 0, 0}, function), 10 + 10 * 0.375, 1e-9);
+}
+
 TEST(EditedFunction, InvalidRangesAreRefused) {
   EditedFunction edited("grey", -1, 1, 1);
   EXPECT_FALSE(edited.setLogScale(true));

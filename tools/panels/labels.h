@@ -33,6 +33,7 @@ struct PanelActions {
   std::optional<bool> interpolates;                   // between steps
   std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
   std::optional<std::string> add_faces;               // of the grid, by name
+  std::optional<std::pair<size_t, std::string>> isosurface_scalar;  // of the n-th one
   std::optional<std::string> colour_faces;            // by a scalar; the empty name: each has its own colour
   bool automatic_function = false;                    // colours and opacities chosen from the data
   bool load_function = false, save_function = false;

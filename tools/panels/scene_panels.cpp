@@ -338,8 +338,9 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
     actions.changed |= eye(one.visible, name);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(removeFrom() - ImGui::GetStyle().ItemSpacing.x - ImGui::GetCursorPosX());
-    chooseScalarOf(one, name, actions);
+    const std::optional<std::string> chosen = chooseScalarOf(one, name);
     if (removeButton(name)) removed = n;
+    if (chosen) actions.isosurface_scalar = {n, *chosen};
     drawValueOf(one, name, actions);
     if (one.visible && one.scalar != state.isoScalar()) {
       ImGui::TextDisabled("drawn when the picture or its opacities show it");
@@ -354,19 +355,20 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
 }
 
 /// Each has a scalar of its own, which need not be the one that the picture shows.
-void SurfacePanel::chooseScalarOf(Isosurface& one, const std::string& name, PanelActions& actions) {
-  if (!ImGui::BeginCombo("##scalar", one.scalar.c_str(), ImGuiComboFlags_HeightLarge))
-    return nameWidget("scalar of " + name);
+std::optional<std::string> SurfacePanel::chooseScalarOf(const Isosurface& one, const std::string& name) const {
+  if (!ImGui::BeginCombo("##scalar", one.scalar.c_str(), ImGuiComboFlags_HeightLarge)) {
+    nameWidget("scalar of " + name);
+    return std::nullopt;
+  }
+  std::optional<std::string> chosen;
   for (const VariableInfo& info : cache_.manifest().variables) {
     const bool chooses =
         ImGui::Selectable(scalarTitle(info.name, info.unit).c_str(), info.name == one.scalar);
     nameWidget(fmt::format("{} by {}", name, info.name));
-    if (!chooses || info.name == one.scalar) continue;
-    one.scalar = info.name;
-    one.value = 0.5 * (info.min + info.max);
-    actions.changed = true;
+    if (chooses && info.name != one.scalar) chosen = info.name;
   }
   ImGui::EndCombo();
+  return chosen;
 }
 
 void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions) {

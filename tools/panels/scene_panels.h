@@ -44,7 +44,7 @@ class SurfacePanel {
   void drawSurfaces(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions);
   void drawColouring(const ViewState& state, PanelActions& actions);
   void drawIsosurfaces(ViewState& state, PanelActions& actions);
-  void chooseScalarOf(Isosurface& one, const std::string& name, PanelActions& actions);
+  std::optional<std::string> chooseScalarOf(const Isosurface& one, const std::string& name) const;
   void drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions);
 
   const CacheReader& cache_;

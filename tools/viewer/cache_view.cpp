@@ -141,6 +141,7 @@ void CacheView::draw(const WindowLayout& layout) {
   reports_.attempt([&] { takeFrame(); });
   reports_.attempt([&] { takeFunction(); });
   reports_.attempt([&] { takeSurface(); });
+  reports_.attempt([&] { takeIsosurfaces(); });
   reports_.attempt([&] { drawFilmPictures(); });
   const ImageSize size = pixelsOf(layout.picture, window_);
   const bool resized = size.width > 0 && !same(size, picture_size_);
@@ -290,6 +291,8 @@ void CacheView::apply(const PanelActions& actions) {
   if (actions.automatic_function) run(Command::kResetFunction);
   if (actions.add_faces) addFaces(*actions.add_faces);
   if (actions.colour_faces) colourFaces(*actions.colour_faces);
+  if (actions.isosurface_scalar)
+    findIsosurface(actions.isosurface_scalar->second, actions.isosurface_scalar->first);
   if (actions.looks_for_scalars) further_.look();
   if (actions.add_scalar) wanted_scalar_ = actions.add_scalar;
   if (actions.load_function) dialog_.open(FileDialog::Purpose::kLoadFunction);
@@ -329,7 +332,8 @@ void CacheView::ask(bool moving) {
 double CacheView::wait() const {
   if (playback_.isPlaying() && isShown() && playback_.wait(clockSeconds()) <= 0) return 0;
   const bool short_wait = navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() ||
-                          film_.isPlaying() || probe_.busy() || chooser_.busy() || reading_surface_.valid();
+                          film_.isPlaying() || probe_.busy() || chooser_.busy() || reading_surface_.valid() ||
+                          !finding_isosurfaces_.empty();
   return short_wait ? kMovingWaitSeconds : kIdleWaitSeconds;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <deque>
 #include <future>
 #include <map>
 #include <memory>
@@ -125,6 +126,8 @@ class CacheView {
   void readSurface(const std::filesystem::path& file);
   void takeSurface();
   void colourFaces(const std::string& scalar);
+  void findIsosurface(const std::string& scalar, std::optional<size_t> replaced = {});
+  void takeIsosurfaces();
   void saveMovieTo(const std::filesystem::path& file);
   MovieRequest newMovie(const std::filesystem::path& file) const;
   void apply(const FilmActions& actions);
@@ -225,6 +228,11 @@ class CacheView {
   PointProbe probe_;
   FunctionChooser chooser_;
   std::future<SurfaceFile> reading_surface_;  // that is to be added
+  struct FoundIsosurface {
+    Isosurface surface;
+    std::optional<size_t> replaced;  // its place in the list; none: it is added
+  };
+  std::deque<std::future<FoundIsosurface>> finding_isosurfaces_;
   uint64_t values_asked_for_ = 0;             // request
   bool values_failed_ = false;                // of the newest request
   double pointed_since_s_ = 0;

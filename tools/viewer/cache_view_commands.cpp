@@ -2,12 +2,24 @@
 #include <GLFW/glfw3.h>
 #include <fmt/format.h>
 
+#include <chrono>
+#include <future>
+#include <utility>
+
+#include "stream/base/threads.h"
+#include "stream/cache/value_histogram.h"
+#include "tools/view/edited_function.h"
 #include "tools/viewer/cache_view.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr size_t kMaxIsosurfaces = 16;
+
+/// Ends the window's wait.
+struct WakeAtEnd {
+  ~WakeAtEnd() { Window::wake(); }
+};
 
 }  // namespace
 
@@ -66,13 +78,10 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
       {Command::kAddSlice, [](View& v) { v.addPlaneTo(v.state_.slices); },
        [](const View& v) { return v.state_.slices.size() < kMaxSlices; }},
       {Command::kAddIsosurface,
-       [](View& v) {
-         const ViewState& state = v.state_;
-         const auto [low, high] = (state.opacity_by ? state.opacity_by->function : state.function).range();
-         v.state_.isosurfaces.push_back({state.opacityScalar(), 0.5 * (low + high)});
-         v.changed_ = true;
-       },
-       [](const View& v) { return v.state_.isosurfaces.size() < kMaxIsosurfaces; }},
+       [](View& v) { v.findIsosurface(v.state_.opacityScalar()); },
+       [](const View& v) {
+         return v.state_.isosurfaces.size() + v.finding_isosurfaces_.size() < kMaxIsosurfaces;
+       }},
       {Command::kAddSurfaceFile, [](View& v) { v.dialog_.open(FileDialog::Purpose::kOpenSurface); }},
       {Command::kRemoveMarkers,
        [](View& v) {
@@ -118,6 +127,40 @@ void CacheView::toggle(bool& value) {
 
 void CacheView::addPlaneTo(std::vector<ListedPlane>& planes) {
   planes.push_back({planeBeforeViewer(manifest(), state_)});
+  changed_ = true;
+}
+
+/// Finds a value of a scalar whose isosurface lies in what is seen, on another thread: it reads the histogram.
+void CacheView::findIsosurface(const std::string& scalar, std::optional<size_t> replaced) {
+  const size_t variable = cache_.variableNamed(scalar);
+  const VariableInfo& info = manifest().variables[variable];
+  EditedFunction function(kMapsOnDark.sequential, info.min, info.max, state_.function.opacityUnit());
+  if (state_.opacityScalar() == scalar)
+    function = state_.opacity_by ? state_.opacity_by->function : state_.function;
+  finding_isosurfaces_.push_back(
+      std::async(std::launch::async, [cache = cache_.at(playback_.position()), variable, scalar, replaced,
+                                      function = std::move(function)] {
+        nameThisThread("isosurface");
+        const WakeAtEnd at_the_end;
+        const double value = middleOfSeen(histogramOf(cache, variable, function, kHistogramBins), function);
+        return FoundIsosurface{{scalar, value}, replaced};
+      }));
+}
+
+void CacheView::takeIsosurfaces() {
+  if (finding_isosurfaces_.empty() ||
+      finding_isosurfaces_.front().wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return;
+  std::future<FoundIsosurface> done = std::move(finding_isosurfaces_.front());
+  finding_isosurfaces_.pop_front();
+  const auto [surface, replaced] = done.get();
+  std::vector<Isosurface>& list = state_.isosurfaces;
+  if (!replaced) {
+    list.push_back(surface);
+  } else if (*replaced < list.size()) {
+    list[*replaced].scalar = surface.scalar;
+    list[*replaced].value = surface.value;
+  }
   changed_ = true;
 }
 
