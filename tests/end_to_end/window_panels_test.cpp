@@ -173,6 +173,10 @@ TEST_F(WindowPanels, OpacitiesOfAnotherScalar) {
   click("opacity by volume");
   const Image two = saveAndCopy();
   EXPECT_LT(difference(one, two), 40);
+  click("clear");
+  EXPECT_LT(difference(save(), two), 40);
+  click("automatic");  // the opacities of the other scalar
+  EXPECT_TRUE(eventually([&] { return difference(save(), two) >= 50; }));
   click("opacity by");
   click("opacity by the same scalar");
   EXPECT_GE(difference(save(), one), 50);

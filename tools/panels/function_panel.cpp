@@ -83,7 +83,7 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
   if (shows != Shows::kOpacities) result.changed |= drawMaps(function, result);
   drawRange(function, variable, step, result);
   if (shows != Shows::kColours) {
-    drawOpacities(function, shows, result);
+    drawOpacities(function, result);
     drawUnit(function, result);
   }
   if (shows != Shows::kColours && ImGui::TreeNode("opacity points")) {
@@ -314,7 +314,7 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
   }
 }
 
-void FunctionPanel::drawOpacities(EditedFunction& function, Shows shows, Result& result) {
+void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   label("opacities");
   const auto button = [](const char* name, const char* what) {
     const bool pressed = ImGui::Button(name);
@@ -322,10 +322,8 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Shows shows, Result&
     hint(what);
     return pressed;
   };
-  if (shows == Shows::kAll) {
-    result.automatic |= button("automatic", "range and opacities as they are chosen from the data");
-    ImGui::SameLine();
-  }
+  result.automatic |= button("automatic", "range and opacities as they are chosen from the data");
+  ImGui::SameLine();
   if (button("ramp", "the colour map with its own opacities, which rise with the values")) {
     const std::string name = function.map().empty() ? kMapsOnDark.sequential : function.map();
     function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());

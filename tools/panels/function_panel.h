@@ -40,7 +40,7 @@ class FunctionPanel {
   bool drawMaps(EditedFunction& function, Result& result);
   bool drawColours(EditedFunction& function);
   void drawRange(EditedFunction& function, size_t variable, uint64_t step, Result& result);
-  static void drawOpacities(EditedFunction& function, Shows shows, Result& result);
+  static void drawOpacities(EditedFunction& function, Result& result);
   void drawUnit(EditedFunction& function, Result& result);
   /// Takes the finished histogram, and starts computing another one if the function's range has changed.
   /// Returns why it cannot be read, once; the one before is kept then.

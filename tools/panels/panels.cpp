@@ -204,7 +204,8 @@ void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t ste
         panel.draw(function, cache_.variableNamed(variable), shows, step, isovalues);
     actions.function_changed |= result.changed;
     actions.dragging |= result.dragging;
-    actions.automatic_function |= result.automatic;
+    (shows == Shows::kOpacities ? actions.automatic_opacities : actions.automatic_function) |=
+        result.automatic;
     actions.load_function |= result.load;
     if (!result.error.empty()) actions.error = result.error;
     actions.save_function |= result.save;

@@ -289,6 +289,8 @@ void CacheView::apply(const PanelActions& actions) {
   if (actions.scalar) chooseScalar(*actions.scalar);
   if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
   if (actions.automatic_function) run(Command::kResetFunction);
+  if (actions.automatic_opacities && state_.opacity_by)
+    chooser_.ask({FunctionChooser::For::kOpacities, state_.opacity_by->variable});
   if (actions.add_faces) addFaces(*actions.add_faces);
   if (actions.colour_faces) colourFaces(*actions.colour_faces);
   if (actions.isosurface_scalar)
