@@ -382,6 +382,22 @@ TEST_F(FurtherScalarTest, AScalarOfTheSourcesIsAddedWhenItIsChosen) {
   EXPECT_EQ(valueOf(commands[2], "--scalar"), "f");
 }
 
+TEST_F(FurtherScalarTest, OneIsAddedForItsOpacities) {
+  open();
+  click("opacity by");
+  click("further opacity by volume");
+  ASSERT_TRUE(eventually([] { return hasWidget("automatic") && hasWidget("opacity by") && !hasWidget("opening"); },
+                         300));
+  ASSERT_TRUE(eventually([] { return runProgram({"info", "one.splats"}).out.find("volume") != std::string::npos; }));
+  save();
+  const Image two = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--scalar"), "f");
+  EXPECT_EQ(valueOf(commands[0], "--opacity-by"), "volume");
+  expectDraws(commands[0], two);
+}
+
 TEST_F(FurtherScalarTest, WithoutTheSourcesNoneIsOffered) {
   fs::rename("a.fun", "away.fun");
   open();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "stream/cache/series.h"
+#include "tools/view/background_jobs.h"
 #include "tools/window/window_commands.h"
 
 namespace curvisplat {
@@ -40,7 +41,7 @@ struct PanelActions {
   bool load_function = false, save_function = false;
   std::optional<std::string> load_view, save_view, remove_view;  // by name
   bool looks_for_scalars = false;         // for what the sources have and the cache lacks
-  std::optional<std::string> add_scalar;  // of those
+  std::optional<WantedScalar> add_scalar;  // of those
   FilmActions film;
   std::string error;  // of what the user asked for
 

@@ -130,8 +130,8 @@ void drawElsewhere(const std::vector<std::string>& names, PanelActions& actions)
   }
 }
 
-/// Draws the scalars that the sources have besides, at the end of the list of scalars.
-void drawFurther(const FurtherScalars& further, PanelActions& actions) {
+/// Draws the scalars that the sources have besides, at the end of a list of scalars.
+void drawFurther(const FurtherScalars& further, bool for_opacities, PanelActions& actions) {
   if (further.from.empty()) {
     if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());
     if (!further.note.empty()) nameWidget("note " + further.note);
@@ -147,8 +147,8 @@ void drawFurther(const FurtherScalars& further, PanelActions& actions) {
   for (const SourceScalar& one : further.scalars) {
     if (ImGui::Selectable(
             fmt::format("{}{}", scalarTitle(one.name, one.unit), one.derived ? "  (computed)" : "").c_str()))
-      actions.add_scalar = one.name;
-    nameWidget("further scalar " + one.name);
+      actions.add_scalar = {one.name, for_opacities};
+    nameWidget((for_opacities ? "further opacity by " : "further scalar ") + one.name);
   }
   ImGui::EndDisabled();
 }
@@ -166,14 +166,20 @@ void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelA
       if (chooses) actions.scalar = one.name;
     }
     if (facts.elsewhere) drawElsewhere(*facts.elsewhere, actions);
-    if (facts.further) drawFurther(*facts.further, actions);
+    if (facts.further) drawFurther(*facts.further, false, actions);
     ImGui::EndCombo();
   } else {
     nameWidget("scalar");
     nameWidget("scalar shown: " + state.variable);
   }
+  drawOpacityScalars(state, facts, actions);
+}
+
+void Panels::drawOpacityScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions) {
+  const auto& variables = cache_.manifest().variables;
+  const bool has_further = facts.further && !facts.further->from.empty();
   label("opacity by");
-  ImGui::BeginDisabled(variables.size() < 2);
+  ImGui::BeginDisabled(variables.size() < 2 && !has_further);
   constexpr const char* kSame = "the same scalar";
   if (ImGui::BeginCombo("##opacity by", state.opacity_by ? state.opacity_by->variable.c_str() : kSame,
                         ImGuiComboFlags_HeightLarge)) {
@@ -186,6 +192,7 @@ void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelA
       nameWidget("opacity by " + one.name);
       if (chooses) actions.opacity_scalar = one.name;
     }
+    if (has_further) drawFurther(*facts.further, true, actions);
     ImGui::EndCombo();
   } else {
     nameWidget("opacity by");

@@ -74,6 +74,7 @@ class Panels {
   void drawObjects(ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawTime(PanelActions& actions, Playback& playback);
   void drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
+  void drawOpacityScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawFunctions(ViewState& state, PanelActions& actions, uint64_t step);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);

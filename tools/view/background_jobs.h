@@ -44,6 +44,12 @@ struct SourceScalar {
   bool derived = false;  // computed from others
 };
 
+/// A scalar that the shown cache lacks and the user has chosen.
+struct WantedScalar {
+  std::string name;
+  bool for_opacities = false;  // of the scalar that is shown; else it is to be shown
+};
+
 /// The functions of conversion that the window needs. The functions run on threads of their own, except for
 /// sources_of, and throw Error; those with a Progress throw Interrupted once it is stopped.
 struct ConversionServices {

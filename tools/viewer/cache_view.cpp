@@ -101,8 +101,8 @@ void CacheView::releasePictures() {
   if (save_to_) say("The picture was not saved, because something else has been opened.");
   if (copy_requested_) say("The command was not copied, because something else has been opened.");
   if (wanted_scalar_)
-    say(fmt::format("{} was not {}, because something else has been opened.", *wanted_scalar_,
-                    hasElsewhere(*wanted_scalar_) ? "shown" : "added"));
+    say(fmt::format("{} was not {}, because something else has been opened.", wanted_scalar_->name,
+                    hasElsewhere(wanted_scalar_->name) ? "shown" : "added"));
   picture_.release();
   overlay_.release();
   for (auto& [number, picture] : film_pictures_) picture.release();
@@ -369,13 +369,15 @@ bool CacheView::isOf(const CacheReader& cache) const {
          std::ranges::equal(cache.manifest().variables, manifest().variables, same_name);
 }
 
-std::optional<std::string> CacheView::takeWantedScalar(bool is_busy) {
+std::optional<WantedScalar> CacheView::takeWantedScalar(bool is_busy) {
   adds_scalar_ = is_busy;
   if (is_busy) return std::nullopt;
-  std::optional<std::string> wanted = std::exchange(wanted_scalar_, std::nullopt);
-  const auto is_wanted = [&](const VariableInfo& one) { return one.name == wanted; };
+  std::optional<WantedScalar> wanted = std::exchange(wanted_scalar_, std::nullopt);
+  const auto is_wanted = [&](const VariableInfo& one) { return one.name == wanted->name; };
   if (!wanted || std::ranges::none_of(manifest().variables, is_wanted)) return wanted;
-  reports_.attempt([&] { chooseScalar(*wanted); });  // it has been added meanwhile
+  reports_.attempt([&] {  // it has been added meanwhile
+    wanted->for_opacities ? chooseOpacityScalar(wanted->name) : chooseScalar(wanted->name);
+  });
   return std::nullopt;
 }
 

@@ -94,7 +94,9 @@ class CacheView {
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }
   /// A scalar that the cache lacks, once: one that hasElsewhere(), or one of the sources, to be added. `is_busy`: something is being opened or added; then it
   /// waits.
-  std::optional<std::string> takeWantedScalar(bool is_busy);
+  std::optional<WantedScalar> takeWantedScalar(bool is_busy);
+  /// The name of the scalar that is shown.
+  const std::string& scalar() const { return state_.variable; }
   /// A movie that is to be drawn, once.
   std::optional<MovieRequest> takeWantedMovie() { return std::exchange(wanted_movie_, std::nullopt); }
   const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
@@ -206,7 +208,7 @@ class CacheView {
   std::vector<std::string> views_;
   FurtherScalarList further_;
   bool adds_scalar_ = false;  // one is being added
-  std::optional<std::string> wanted_scalar_;
+  std::optional<WantedScalar> wanted_scalar_;
   MovieKind movie_kind_ = MovieKind::kOneTurn;  // for which a file is being chosen
   std::optional<MovieRequest> wanted_movie_;
 

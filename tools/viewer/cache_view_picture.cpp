@@ -385,7 +385,7 @@ void CacheView::choose(const MenuChoice& choice) {
   if (choice.view) loadView(*choice.view);
   if (choice.faces) addFaces(*choice.faces);
   if (choice.looks_for_scalars) further_.look();
-  if (choice.add_scalar) wanted_scalar_ = choice.add_scalar;
+  if (choice.add_scalar) wanted_scalar_ = WantedScalar{*choice.add_scalar};
   if (choice.scalar) chooseScalar(*choice.scalar);
   if (choice.opacity_scalar)
     chooseOpacityScalar(*choice.opacity_scalar == otherScalars().front() ? "" : *choice.opacity_scalar);
@@ -394,7 +394,7 @@ void CacheView::choose(const MenuChoice& choice) {
 void CacheView::chooseScalar(const std::string& name) {
   using For = FunctionChooser::For;
   if (hasElsewhere(name)) {
-    wanted_scalar_ = name;
+    wanted_scalar_ = WantedScalar{name};
     return;
   }
   const bool is_shown = name == state_.variable;

@@ -141,11 +141,12 @@ void OpenedView::open(const std::vector<fs::path>& files) {
 }
 
 /// Shows a scalar that the shown cache lacks: the whole cache has it, or it is added to that from the sources.
-void OpenedView::add(const std::string& scalar) {
-  adds_to_ = scalar;
+void OpenedView::add(const WantedScalar& wanted) {
+  const std::string& scalar = wanted.name;
+  adds_to_ = wanted;
   preparation_ =
       std::make_shared<Preparation>(Preparation{viewOptions(), surroundings_.picture_size(), nullptr});
-  preparation_->options.scalar = scalar;
+  preparation_->options.scalar = wanted.for_opacities ? view_->scalar() : scalar;
   preparation_->options.preview = view_->preview();
   const bool is_there = view_->hasElsewhere(scalar);
   opening_ = std::make_unique<Opening>(
@@ -195,10 +196,12 @@ void OpenedView::takeWhole() {
     if (adds_to_) {
       options.grid_files = view_->gridFiles();
       options.carried = view_->carriedTo(*preparation->prepared);
-      options.scalar = adds_to_;
+      if (!adds_to_->for_opacities) options.scalar = adds_to_->name;
       options.preview = view_->preview();
-      return show(*preparation->prepared, options,
-                  options.grid_files.empty() ? std::vector{cache} : options.grid_files);
+      show(*preparation->prepared, options,
+           options.grid_files.empty() ? std::vector{cache} : options.grid_files);
+      if (adds_to_->for_opacities) view_->chooseOpacityScalar(adds_to_->name);
+      return;
     }
     const bool is_kept = opening_files_.size() > 1 || opening_files_.front() != cache;
     if (is_kept) options.grid_files = opening_files_;

@@ -77,7 +77,7 @@ class OpenedView {
   void show(const PreparedView& prepared, const ViewerOptions& options,
             const std::vector<std::filesystem::path>& files);
   void retire(std::unique_ptr<CacheView> view, std::promise<void> has_ended);
-  void add(const std::string& scalar);
+  void add(const WantedScalar& wanted);
   ViewerOptions viewOptions() const;
   void takeOpened();
   void takeWhole();
@@ -88,7 +88,7 @@ class OpenedView {
   std::unique_ptr<CacheView> view_;
   std::vector<std::filesystem::path> opening_files_;  // that are being opened, or were
   bool opens_command_line_ = false;                   // they are those of the command line
-  std::optional<std::string> adds_to_;                // the scalar that is being added instead
+  std::optional<WantedScalar> adds_to_;               // the scalar that is being added instead
   std::shared_ptr<Preparation> preparation_;          // of what is being opened
   std::unique_ptr<Opening> opening_;
   std::future<void> retired_;  // the view before, while it ends
