@@ -277,12 +277,13 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   ImGui::SameLine();
   commandOption(Command::kFly, actions, "fly", facts.flies);
   constexpr std::pair<Command, const char*> kSides[]{
-      {Command::kLookPlusX, "+x"},  {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
-      {Command::kLookMinusY, "-y"}, {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"}};
+      {Command::kLookPlusX, "+x"},     {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
+      {Command::kLookMinusY, "-y"},    {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
+      {Command::kLookIsometric, "iso"}};
   label("look from");
   for (const auto& [command, text] : kSides) {
     commandButton(command, actions, text);
-    if (command != Command::kLookMinusZ) ImGui::SameLine();
+    if (command != Command::kLookIsometric) ImGui::SameLine();
   }
   float angle = static_cast<float>(state.camera.view_angle_deg);
   label("view angle");

@@ -194,8 +194,9 @@ bool Navigation::fly(const Window& window, Camera& camera) {
 
 bool Navigation::run(Command command, Camera& camera, ImageSize size) {
   static constexpr std::pair<Command, const char*> kLooks[] = {
-      {Command::kLookPlusX, "+x"},  {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
-      {Command::kLookMinusY, "-y"}, {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"}};
+      {Command::kLookPlusX, "+x"},     {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
+      {Command::kLookMinusY, "-y"},    {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
+      {Command::kLookIsometric, "iso"}};
   for (const auto& [look, from] : kLooks) {
     if (look != command) continue;
     camera = Camera::named(from, lower_, upper_, size, camera.projection, camera.view_angle_deg);

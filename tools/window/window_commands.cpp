@@ -47,6 +47,7 @@ constexpr std::array kCommands{
     CommandInfo{Command::kLookMinusY, "View", "From -y", GLFW_KEY_Y, kShift, !kControl, "Shift+Y"},
     CommandInfo{Command::kLookPlusZ, "View", "From +z", GLFW_KEY_Z, !kShift, !kControl, "Z"},
     CommandInfo{Command::kLookMinusZ, "View", "From -z", GLFW_KEY_Z, kShift, !kControl, "Shift+Z"},
+    CommandInfo{Command::kLookIsometric, "View", "Isometric", GLFW_KEY_I, !kShift, !kControl, "I"},
     CommandInfo{Command::kOtherProjection, "View", "Perspective", GLFW_KEY_O, !kShift, !kControl, "O",
                 kGroup},
     CommandInfo{Command::kFly, "View", "Fly (W S A D Q E move)", GLFW_KEY_F, !kShift, !kControl, "F"},

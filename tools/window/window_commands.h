@@ -39,6 +39,7 @@ enum class Command {
   kLookMinusY,
   kLookPlusZ,
   kLookMinusZ,
+  kLookIsometric,
   kOtherProjection,
   kFly,
   kSaveView,
