@@ -1,6 +1,7 @@
 // Panels and menus of the window: values and markers, planes in the picture, two scalars, undo, saved views,
 // messages, keys.
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <regex>
@@ -85,6 +86,27 @@ TEST_F(WindowPanels, AClickKeepsAMarkerWhichIsRenamedUndoneAndRemoved) {
   openMarkers();
   click("remove marker 1");
   EXPECT_TRUE(gone("sign of marker 1"));
+  close();
+}
+
+TEST_F(WindowPanels, MarkersSayHowFarApartTheyAre) {
+  open();
+  save();
+  std::vector<std::array<double, 3>> points;
+  for (const double across : {0.42, 0.55}) {
+    const std::string begin = fmt::format("message marker {}: f ", points.size() + 1);
+    click(placeOf("picture", across, 0.5));
+    std::smatch parts;
+    const std::string message = widget(begin);
+    ASSERT_TRUE(std::regex_search(message, parts, std::regex("at (\\S+), (\\S+), (\\S+);"))) << message;
+    points.push_back({std::stod(parts[1]), std::stod(parts[2]), std::stod(parts[3])});
+  }
+  openMarkers();
+  const std::string distance = widget("distance 1 to 2: ");
+  double sum = 0;
+  for (size_t axis = 0; axis < 3; ++axis) sum += std::pow(points[1][axis] - points[0][axis], 2);
+  EXPECT_GT(sum, 1e-4);
+  EXPECT_NEAR(std::stod(distance.substr(distance.find(": ") + 2)), std::sqrt(sum), 1e-4) << distance;
   close();
 }
 

@@ -128,7 +128,21 @@ bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Manifest& mani
   return true;
 }
 
-void drawMarkers(ViewState& state, PanelActions& actions) {
+namespace {
+
+/// Draws the distance between two markers, along a straight line and without --scale.
+void drawDistance(const Marker& from, const Marker& to, bool on_globe) {
+  const std::string text = fmt::format("{} to {}: {:.5g}{}", from.name, to.name,
+                                       glm::distance(from.point, to.point), on_globe ? " km" : "");
+  ImGui::TextDisabled("%s", text.c_str());
+  nameWidget("distance " + text);
+  hint(on_globe ? "along a straight line, through the Earth"
+                : "along a straight line, in the units of the coordinates");
+}
+
+}  // namespace
+
+void drawMarkers(ViewState& state, bool on_globe, PanelActions& actions) {
   if (state.markers.empty()) ImGui::TextDisabled("Click into the picture to keep a value.");
   size_t removed = state.markers.size();
   for (size_t n = 0; n < state.markers.size(); ++n) {
@@ -148,6 +162,7 @@ void drawMarkers(ViewState& state, PanelActions& actions) {
                                          marker.point.y, marker.point.z)
                                  .c_str());
     hint(fmt::format("block {}, i {}, j {}, k {}", marker.block + 1, marker.i, marker.j, marker.k).c_str());
+    if (n > 0) drawDistance(state.markers[n - 1], marker, on_globe);
     ImGui::PopID();
   }
   if (removed == state.markers.size()) return;

@@ -40,9 +40,9 @@ class PlaneHandles {
 /// the normal's end are seen. 0 where the normal points at the viewer.
 double shiftAlong(const glm::dvec2& from, const glm::dvec2& to, const glm::dvec2& movement);
 
-/// Draws the list of markers, the places in the data that were clicked: names to edit, values, and buttons
-/// that remove one.
-void drawMarkers(ViewState& state, PanelActions& actions);
+/// Draws the list of markers, the places in the data that were clicked: names to edit, values, distances from one to the
+/// next, and buttons that remove one. `on_globe`: coordinates are kilometres.
+void drawMarkers(ViewState& state, bool on_globe, PanelActions& actions);
 
 /// Draws the markers over the picture.
 void drawMarkerSigns(const ViewState& state, const PlaceInWindow& place);
