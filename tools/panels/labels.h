@@ -35,12 +35,12 @@ struct PanelActions {
   std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
   std::optional<std::string> add_faces;               // of the grid, by name
   std::optional<std::pair<size_t, std::string>> isosurface_scalar;  // of the n-th one
-  std::optional<std::string> colour_faces;            // by a scalar; the empty name: each has its own colour
-  bool automatic_function = false;                    // colours and opacities chosen from the data
-  bool automatic_opacities = false;                   // the same of the other scalar's, which gives opacities
+  std::optional<std::string> colour_faces;  // by a scalar; the empty name: each has its own colour
+  bool automatic_function = false;          // colours and opacities chosen from the data
+  bool automatic_opacities = false;         // the same of the other scalar's, which gives opacities
   bool load_function = false, save_function = false;
   std::optional<std::string> load_view, save_view, remove_view;  // by name
-  bool looks_for_scalars = false;         // for what the sources have and the cache lacks
+  bool looks_for_scalars = false;          // for what the sources have and the cache lacks
   std::optional<WantedScalar> add_scalar;  // of those
   FilmActions film;
   std::string error;  // of what the user asked for

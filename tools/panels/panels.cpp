@@ -103,7 +103,8 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
   surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
   cuts_.draw(state, actions);
   std::optional<size_t> seen = state.markers.size();  // a click in the picture unfolds nothing
-  if (const Section open{"Markers", seen, state.markers.size()}) drawMarkers(state, cache_.manifest().globe.has_value(), actions);
+  if (const Section open{"Markers", seen, state.markers.size()})
+    drawMarkers(state, cache_.manifest().globe.has_value(), actions);
 }
 
 void Panels::drawTime(PanelActions& actions, Playback& playback) {

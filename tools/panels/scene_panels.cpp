@@ -355,7 +355,8 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
 }
 
 /// Each has a scalar of its own, which need not be the one that the picture shows.
-std::optional<std::string> SurfacePanel::chooseScalarOf(const Isosurface& one, const std::string& name) const {
+std::optional<std::string> SurfacePanel::chooseScalarOf(const Isosurface& one,
+                                                        const std::string& name) const {
   if (!ImGui::BeginCombo("##scalar", one.scalar.c_str(), ImGuiComboFlags_HeightLarge)) {
     nameWidget("scalar of " + name);
     return std::nullopt;

@@ -164,9 +164,24 @@ void CacheView::draw(const WindowLayout& layout) {
   drawStatus(layout);
 }
 
+/// Where bars take more of its width than they did when the view was fitted, the view zooms out, and in again when they go:
+/// what is between the picture's sides stays there.
 void CacheView::fitTo(ImageSize size) {
+  const double before = zoomForBars();
+  const bool is_resized = !same(size, picture_size_);
   picture_size_ = size;
-  data_size_ = dataSizeOf(state_, manifest(), size);
+  takeBars();
+  if (is_resized) fitted_width_ = data_size_.width / before;
+  if (zoomForBars() != before) state_.camera = zoomed(state_.camera, zoomForBars() / before);
+}
+
+double CacheView::zoomForBars() const {
+  return fitted_width_ > 0 ? std::min(1.0, data_size_.width / fitted_width_) : 1;
+}
+
+/// The state's camera is one for the bars that it has.
+void CacheView::takeBars() {
+  data_size_ = dataSizeOf(state_, manifest(), picture_size_);
 }
 
 void CacheView::takeFrame() {
@@ -350,6 +365,7 @@ void CacheView::restore(const ViewState* state) {
   if (!state) return;
   chooser_.drop();
   state_ = *state;
+  takeBars();
   ++function_version_;
   changed_ = true;
 }

@@ -146,6 +146,8 @@ class CacheView {
   void restartFrames();
   /// The window's picture has this size, in pixels.
   void fitTo(ImageSize size);
+  double zoomForBars() const;
+  void takeBars();
   void react(const WindowLayout& layout);
   PanelActions drawPanels(const WindowLayout& layout);
   void apply(const PanelActions& actions);
@@ -220,6 +222,7 @@ class CacheView {
   bool changed_ = true;  // since the newest request
   uint64_t function_version_ = 1, request_ = 0;
   ImageSize picture_size_{0, 0}, data_size_{0, 0};  // of the newest request
+  double fitted_width_ = 0;  // of the data's part of the picture, when the view was fitted to it
   std::optional<ShownFrame> shown_;
   double shown_strip_ = 0;  // part of the picture that the scalar bars take
   bool was_moving_ = false, dragging_ = false, rests_ = false;
@@ -235,8 +238,8 @@ class CacheView {
     std::optional<size_t> replaced;  // its place in the list; none: it is added
   };
   std::deque<std::future<FoundIsosurface>> finding_isosurfaces_;
-  uint64_t values_asked_for_ = 0;             // request
-  bool values_failed_ = false;                // of the newest request
+  uint64_t values_asked_for_ = 0;  // request
+  bool values_failed_ = false;     // of the newest request
   double pointed_since_s_ = 0;
   glm::dvec2 pointed_{-1.0};
   struct Click {

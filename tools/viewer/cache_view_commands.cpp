@@ -77,8 +77,7 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
        [](const View& v) { return v.state_.clip_planes.size() < kMaxClipPlanes; }},
       {Command::kAddSlice, [](View& v) { v.addPlaneTo(v.state_.slices); },
        [](const View& v) { return v.state_.slices.size() < kMaxSlices; }},
-      {Command::kAddIsosurface,
-       [](View& v) { v.findIsosurface(v.state_.opacityScalar()); },
+      {Command::kAddIsosurface, [](View& v) { v.findIsosurface(v.state_.opacityScalar()); },
        [](const View& v) {
          return v.state_.isosurfaces.size() + v.finding_isosurfaces_.size() < kMaxIsosurfaces;
        }},
@@ -137,9 +136,9 @@ void CacheView::findIsosurface(const std::string& scalar, std::optional<size_t> 
   EditedFunction function(kMapsOnDark.sequential, info.min, info.max, state_.function.opacityUnit());
   if (state_.opacityScalar() == scalar)
     function = state_.opacity_by ? state_.opacity_by->function : state_.function;
-  finding_isosurfaces_.push_back(
-      std::async(std::launch::async, [cache = cache_.at(playback_.position()), variable, scalar, replaced,
-                                      function = std::move(function)] {
+  finding_isosurfaces_.push_back(std::async(
+      std::launch::async,
+      [cache = cache_.at(playback_.position()), variable, scalar, replaced, function = std::move(function)] {
         nameThisThread("isosurface");
         const WakeAtEnd at_the_end;
         const double value = middleOfSeen(histogramOf(cache, variable, function, kHistogramBins), function);
@@ -171,6 +170,7 @@ void CacheView::saveMovieOf(MovieKind kind) {
 
 void CacheView::moveCamera(Command command) {
   changed_ |= navigation_.run(command, state_.camera, data_size_);
+  if (command != Command::kOtherProjection && command != Command::kFly) fitted_width_ = data_size_.width;
 }
 
 }  // namespace curvisplat

@@ -89,6 +89,7 @@ void CacheView::showFilm(bool whole_function) {
   chooser_.drop(FunctionChooser::For::kScalar);
   chooser_.drop(FunctionChooser::For::kSameScalar);
   show(*film, film_.time(), state_);
+  takeBars();
   if (const auto at = positionOf(*film, film_.time(), cache_.series(), playback_.interpolates()))
     playback_.goTo(*at);
   if (whole_function) ++function_version_;
