@@ -118,8 +118,4 @@ class EditedFunction {
 std::vector<double> histogramOf(const CacheReader& cache, size_t variable, const EditedFunction& function,
                                 size_t bins);
 
-/// The scalar that divides what a function shows into halves: of the volume, each part times its opacity. Where all is
-/// transparent it divides the volume, and without any volume the range. `histogram`: as of histogramOf().
-double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function);
-
 }  // namespace curvisplat

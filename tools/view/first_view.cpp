@@ -4,8 +4,10 @@
 #include <chrono>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "render/automatic/first_choice.h"
+#include "render/colour/control_points.h"
 #include "stream/base/threads.h"
 
 namespace curvisplat {
@@ -35,6 +37,27 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
 
 EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar) {
   return EditedFunction::automatic(choiceOf(cache, scalar).function());
+}
+
+double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function) {
+  const OpacityCurve opacities(function.points());
+  const auto count = static_cast<double>(histogram.size());
+  const auto sumsOf = [&](bool with_opacity) {
+    std::vector<double> sums{0};
+    for (size_t bin = 0; bin < histogram.size(); ++bin) {
+      const double opacity = with_opacity ? opacities.at((static_cast<double>(bin) + 0.5) / count) : 1;
+      sums.push_back(sums.back() + histogram[bin] * opacity);
+    }
+    return sums;
+  };
+  std::vector<double> sums = sumsOf(true);
+  if (!(sums.back() > 0)) sums = sumsOf(false);
+  if (!(sums.back() > 0)) return function.scalarAt(0.5);
+  const double half = 0.5 * sums.back();
+  const auto next = std::ranges::lower_bound(sums, half);  // not the first, which is 0
+  const double before = *(next - 1);
+  return function.scalarAt((static_cast<double>(next - sums.begin()) - 1 + (half - before) / (*next - before)) /
+                           count);
 }
 
 void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name) {

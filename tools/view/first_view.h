@@ -8,6 +8,7 @@
 #include <future>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stream/cache/cache_reader.h"
 #include "tools/view/edited_function.h"
@@ -21,6 +22,10 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
 
 /// The function that is chosen from the data for a scalar.
 EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar);
+
+/// The scalar that divides what a function shows into halves: of the volume, each part times its opacity. Where all is
+/// transparent it divides the volume, and without any volume the range. `histogram`: as of histogramOf().
+double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function);
 
 /// Selects another scalar. An automatic function is chosen anew; another keeps its points over the scalar's
 /// range. Throws UsageError that lists the scalars if there is none of this name.

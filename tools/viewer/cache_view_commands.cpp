@@ -9,6 +9,7 @@
 #include "stream/base/threads.h"
 #include "stream/cache/value_histogram.h"
 #include "tools/view/edited_function.h"
+#include "tools/view/first_view.h"
 #include "tools/viewer/cache_view.h"
 
 namespace curvisplat {
