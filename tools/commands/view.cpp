@@ -111,7 +111,12 @@ ConversionServices conversionServices(ValuePrecision precision) {
     kept.preview = [&](const KeptPreview& preview) {
       events.preview({preview.cache, preview.whole, whatOf(preview), preview.folder});
     };
-    return keptCacheOf(files, progress, kept, {}, precision);
+    try {
+      return keptCacheOf(files, progress, kept, {}, precision);
+    } catch (const LoneGrid&) {
+      throw Error("{}: has no values, only coordinates: choose the solution, too (Ctrl + click takes several files)",
+                  files.front().filename().string());
+    }
   };
   services.sources_of = sourcesOf;
   services.further_scalars = [](const std::filesystem::path& cache, const Paths& files) {

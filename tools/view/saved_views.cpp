@@ -108,6 +108,7 @@ WindowSettings readSettings() {
       settings.recent.push_back(files.texts());
       if (settings.recent.back().empty()) settings.recent.pop_back();
     }
+    if (const auto folder = fields.find("data_folder")) settings.data_folder = folder->text();
   } catch (const Error& error) {
     printMessage("warning: {}; using the default settings", error.what());
     return {};
@@ -120,7 +121,8 @@ void writeSettings(const WindowSettings& settings) {
   if (!file) return;
   const nlohmann::ordered_json json = {{"light_theme", settings.light_theme},
                                        {"text_scale", settings.text_scale},
-                                       {"recent", settings.recent}};
+                                       {"recent", settings.recent},
+                                       {"data_folder", settings.data_folder}};
   writeState(*file, json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 

@@ -194,8 +194,11 @@ class Viewer {
 
   void pressKeys() {
     for (const Window::Key& key : window_.takeKeys()) {
-      if (dialog_.isOpen()) continue;
       const auto command = commandOf(key);
+      if (dialog_.isOpen()) {
+        if (command == Command::kKeys) dialog_.toggleHelp();
+        continue;
+      }
       if (command && isEnabled(*command)) reports_.attempt([&] { run(*command); });
     }
   }
@@ -258,6 +261,7 @@ class Viewer {
 
   void remember() {
     if (const CacheView* const view = opened_.view()) view->remember();
+    settings_.data_folder = dialog_.dataFolder().string();
     try {
       writeSettings(settings_);
     } catch (const Error& error) {
@@ -271,7 +275,7 @@ class Viewer {
   Window window_;
   Toasts toasts_;
   Reports reports_{toasts_, glfwGetTime};
-  FileDialog dialog_{options_.conversion.is_grid_folder};
+  FileDialog dialog_{options_.conversion.is_grid_folder, settings_.data_folder};
   OpenedView opened_{options_, {window_, reports_, dialog_, settings_, [this] { return pictureSize(); }}};
   std::unique_ptr<BackgroundJob> movie_;  // that is being drawn
   bool saves_picture_ = false;            // it is one picture

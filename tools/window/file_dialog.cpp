@@ -5,6 +5,7 @@
 #include <imgui_stdlib.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdlib>
 #include <iterator>
 #include <sstream>
@@ -27,10 +28,21 @@ struct Look {
   std::vector<std::string> endings = {};
 };
 
+/// The endings of what is read (FORMATS.md), without those of compressed files.
+const std::vector<std::string>& dataEndings() {
+  static const std::vector<std::string> endings{
+      ".splats", ".p3d", ".xyz", ".x", ".g", ".grd", ".grid", ".q", ".f", ".fun", ".fmt", ".bin", ".dat",
+      ".vts", ".vtr", ".vti", ".vtu", ".pvts", ".pvtr", ".pvti", ".pvtu", ".vtm", ".vtmb", ".vtpd", ".vth",
+      ".vthb", ".pvd", ".vtk", ".vtkhdf", ".hdf", ".hdf5", ".h5", ".series", ".cgns", ".adf", ".nc", ".nc4",
+      ".cdf", ".netcdf", ".zip", ".zarr", ".case", ".encas", ".tec", ".tp", ".plt", ".xmf", ".xdmf", ".foam",
+      ".msh", ".e", ".ex2", ".exo", ".exii", ".su2", ".csv"};
+  return endings;
+}
+
 Look lookOf(FileDialog::Purpose purpose) {
   switch (purpose) {
     case FileDialog::Purpose::kOpenData:
-      return {"Open a cache or a grid", "open"};
+      return {"Open a cache or a grid", "open", false, dataEndings()};
     case FileDialog::Purpose::kLoadFunction:
       return {"Load colours and opacities", "load", false, {".json"}};
     case FileDialog::Purpose::kSaveFunction:
@@ -47,6 +59,18 @@ Look lookOf(FileDialog::Purpose purpose) {
       return {"Save movie", "save", true, {".mp4", ".gif", ".png"}};
   }
   return {"", ""};
+}
+
+/// Whether a file can be of these endings: names without an ending and numbers, as those of steps and processors, can be
+/// any. Letters may be large or small.
+bool fits(fs::path name, const std::vector<std::string>& endings) {
+  for (const char* compressed : {".gz", ".xz", ".zst"})
+    if (name.extension() == compressed) name = name.stem();
+  std::string ending = name.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const bool is_number = std::ranges::all_of(ending.substr(std::min<size_t>(1, ending.size())),
+                                             [](unsigned char c) { return std::isdigit(c) != 0; });
+  return is_number || std::ranges::find(endings, ending) != endings.end();
 }
 
 /// Whether a folder is opened as a whole.
@@ -73,9 +97,8 @@ std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std
     std::error_code ignored;
     const bool is_directory = at->is_directory(ignored);
     const bool is_folder = is_directory && !isOneFile(at->path(), is_grid_folder);
-    const bool fits = endings.empty() || std::find(endings.begin(), endings.end(),
-                                                   at->path().extension().string()) != endings.end();
-    if (!is_folder && !fits) continue;
+    const bool is_listed = is_folder || is_directory || endings.empty() || fits(name, endings);
+    if (!is_listed) continue;
     const uint64_t bytes = is_directory ? 0 : at->file_size(ignored);
     entries.push_back({name, is_folder, ignored ? 0 : bytes});
   }
@@ -90,7 +113,10 @@ void FileDialog::open(Purpose purpose, const std::string& name) {
   purpose_ = purpose;
   opens_ = true;
   frames_to_focus_ = kFramesToFocus;
+  all_files_ = help_ = false;
   std::error_code ignored;
+  if (folder_.empty() && purpose == Purpose::kOpenData && fs::is_directory(data_folder_, ignored))
+    folder_ = data_folder_;
   enter(folder_.empty() ? fs::current_path(ignored) : folder_);
   select({});
   name_ = name;
@@ -109,9 +135,10 @@ void FileDialog::openToSaveMovie(const std::string& name, const std::string& abo
 void FileDialog::enter(const fs::path& folder) {
   error_.clear();
   overwrites_.clear();
-  if (!lookOf(*purpose_).saves) select({});
+  const Look look = lookOf(*purpose_);
+  if (!look.saves) select({});
   try {
-    entries_ = entriesOf(folder, lookOf(*purpose_).endings, is_grid_folder_);
+    entries_ = entriesOf(folder, all_files_ ? std::vector<std::string>{} : look.endings, is_grid_folder_);
     folder_ = folder;
   } catch (const Error& error) {
     error_ = error.what();
@@ -139,7 +166,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   if (home && ImGui::Button("home")) enter(home);
   if (home) ImGui::SameLine();
   ImGui::TextUnformatted(folder_.c_str());
-  drawEntries(accepts);
+  help_ ? drawHelp(look.saves) : drawEntries(accepts);
   ImGui::SetNextItemWidth(-1);
   if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
   accepts |= ImGui::InputTextWithHint("##name", look.saves ? "name" : "name, or a path", &name_,
@@ -156,9 +183,16 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   accepts |= ImGui::Button(look.button);
   nameWidget("file accept");
   ImGui::SameLine();
-  const bool cancels = ImGui::Button("cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape));
+  bool cancels = ImGui::Button("cancel");
   nameWidget("file cancel");
+  if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) cancels |= !std::exchange(help_, false);
   ImGui::SameLine();
+  if (*purpose_ == Purpose::kOpenData) {
+    const bool toggles = ImGui::Checkbox("all files", &all_files_);
+    nameWidget("all files");
+    if (toggles) enter(fs::path(folder_));
+    ImGui::SameLine();
+  }
   if (error_.empty() && *purpose_ == Purpose::kOpenData)
     ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
   else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
@@ -167,12 +201,44 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
   if (accepts) chosen = accept();
+  if (chosen && chosen->purpose == Purpose::kOpenData) data_folder_ = folder_;
   if (cancels || chosen) {
     ImGui::CloseCurrentPopup();
     purpose_.reset();
   }
   ImGui::EndPopup();
   return chosen;
+}
+
+float FileDialog::heightBelow() const {
+  const bool has_size = *purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie;
+  return (has_size ? 3.6f : 2.6f) * ImGui::GetFrameHeightWithSpacing();
+}
+
+/// Draws the dialog's keys in the place of the files.
+void FileDialog::drawHelp(bool saves) const {
+  ImGui::BeginChild("entries", {0, -heightBelow()}, true);
+  nameArea("dialog keys", 0, 0, 1, 1);
+  if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_RowBg)) {
+    const auto row = [](const char* key, const char* what) {
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(key);
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(what);
+    };
+    ImGui::TableSetupColumn("key or mouse");
+    ImGui::TableSetupColumn("what it does");
+    ImGui::TableHeadersRow();
+    row("Return", saves ? "saves under the name" : "opens what is named or chosen; enters a folder");
+    row("Esc", "closes the dialog");
+    row("click", "chooses a file");
+    row("double click", saves ? "saves under its name; enters a folder" : "opens a file; enters a folder");
+    if (*purpose_ == Purpose::kOpenData) row("Ctrl + click", "chooses several: a grid and its solutions");
+    row("F1", "shows the files again");
+    ImGui::EndTable();
+  }
+  ImGui::EndChild();
 }
 
 /// Width and height in pixels, and buttons for usual ones.
@@ -207,9 +273,7 @@ void FileDialog::drawSize() {
 
 /// A click takes a name, with Control several; a double click opens.
 void FileDialog::drawEntries(bool& accepts) {
-  const float lines = *purpose_ == Purpose::kSavePicture ? 3.6f : 2.6f;
-  const float below = lines * ImGui::GetFrameHeightWithSpacing();
-  ImGui::BeginChild("entries", {0, -below}, true);
+  ImGui::BeginChild("entries", {0, -heightBelow()}, true);
   std::optional<fs::path> entered;
   if (entries_.empty())
     ImGui::TextDisabled("%s", lookOf(*purpose_).saves

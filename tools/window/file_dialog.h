@@ -25,8 +25,8 @@ struct FolderEntry {
 /// Whether a folder is a grid's, to be opened as a file is.
 using IsGridFolder = std::function<bool(const std::filesystem::path& folder)>;
 
-/// Folders first, by name, without those that begin with a dot; files with one of the endings, or all if
-/// there are none. Throws Error if the folder cannot be read.
+/// Folders first, by name, without those that begin with a dot; files with one of the endings, compressed ones, too, or all
+/// if there are none; files without an ending or with a number for one in any case. Throws Error if the folder cannot be read.
 std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
                                    const std::vector<std::string>& endings,
                                    const IsGridFolder& is_grid_folder);
@@ -49,8 +49,9 @@ class FileDialog {
     std::optional<ImageSize> size = std::nullopt;  // of a picture
   };
 
-  /// `is_grid_folder` may be empty: no folder is.
-  explicit FileDialog(IsGridFolder is_grid_folder) : is_grid_folder_(std::move(is_grid_folder)) {}
+  /// `is_grid_folder` may be empty: no folder is. `data_folder`: where data were opened last; may be empty.
+  FileDialog(IsGridFolder is_grid_folder, std::filesystem::path data_folder)
+      : is_grid_folder_(std::move(is_grid_folder)), data_folder_(std::move(data_folder)) {}
 
   /// Opens it with the next draw(), in the folder it was in last. `name`: the one that is offered.
   void open(Purpose purpose, const std::string& name = "");
@@ -59,11 +60,16 @@ class FileDialog {
   /// The same, to save a movie; `about`: its pictures and how long it plays.
   void openToSaveMovie(const std::string& name, const std::string& about);
   bool isOpen() const { return purpose_.has_value(); }
+  /// Shows the dialog's keys in the place of the files, or the files again.
+  void toggleHelp() { help_ = !help_; }
+  const std::filesystem::path& dataFolder() const { return data_folder_; }
   /// Draws it, if it is open. Returns what was chosen, once.
   std::optional<Chosen> draw(Window& window);
 
  private:
   void enter(const std::filesystem::path& folder);
+  float heightBelow() const;
+  void drawHelp(bool saves) const;
   void drawEntries(bool& accepts);
   void select(std::vector<std::string> names);
   bool isTaken(const std::string& name) const;
@@ -74,6 +80,8 @@ class FileDialog {
   std::optional<Purpose> purpose_;
   bool opens_ = false;
   int frames_to_focus_ = 0;  // at most: what is typed waits until the name has the focus
+  bool all_files_ = false, help_ = false;
+  std::filesystem::path data_folder_;  // from which data were opened last
   std::filesystem::path folder_;
   std::vector<FolderEntry> entries_;
   std::vector<std::string> taken_;  // names that were clicked
