@@ -41,6 +41,24 @@ TEST(Toasts, TheSameTextIsNewAgainOnceItHasGone) {
   EXPECT_TRUE(toasts.add("saved", 100));
 }
 
+/// Success ends what an earlier failure of the same said, and nothing else.
+TEST(Reports, AnErrorGoesWhenTheSameSucceeds) {
+  Toasts toasts;
+  Reports reports(toasts, [] { return 1.0; });
+  reports.attempt([] { throw Error("a.xyz: has no values"); }, About::kOpening);
+  reports.attempt([] { throw Error("the disk is full"); }, About::kSaving);
+  reports.attempt([] { throw Error("another"); });
+  EXPECT_EQ(toasts.shown(1).size(), 3u);
+  reports.settle(About::kNothing);
+  EXPECT_EQ(toasts.shown(1).size(), 3u);
+  reports.settle(About::kOpening);
+  ASSERT_EQ(toasts.shown(1).size(), 2u);
+  EXPECT_EQ(toasts.shown(1)[0].text, "the disk is full");
+  reports.settle(About::kSaving);
+  EXPECT_EQ(toasts.shown(1).size(), 1u);
+  EXPECT_EQ(toasts.log().size(), 3u);
+}
+
 TEST(Reports, AnErrorIsSaidAndWorkGoesOn) {
   Toasts toasts;
   Reports reports(toasts, [] { return 1.0; });

@@ -138,7 +138,7 @@ ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOption
 }
 
 void CacheView::draw(const WindowLayout& layout) {
-  reports_.attempt([&] { takeFrame(); });
+  reports_.attempt([&] { takeFrame(); }, About::kPicture);
   reports_.attempt([&] { takeFunction(); });
   reports_.attempt([&] { takeSurface(); });
   reports_.attempt([&] { takeIsosurfaces(); });
@@ -152,7 +152,7 @@ void CacheView::draw(const WindowLayout& layout) {
     // A button that is pressed and has not moved anything asks for nothing: a click for a value is answered at once.
     if (changed_ || (was_moving_ && !moving) || resized) {
       fitTo(size);  // bars may have come or gone
-      reports_.attempt([&] { ask(moving); });
+      reports_.attempt([&] { ask(moving); }, About::kPicture);
     }
     showPicture(layout);
     savePictureIfFinal();
@@ -199,6 +199,7 @@ void CacheView::takeFrame() {
     throw;
   }
   if (!frame) return;
+  reports_.settle(About::kPicture);
   picture_.set(frame->bytes, frame->image.size);
   window_.redraw();
   shown_ = std::move(frame);
@@ -322,7 +323,8 @@ void CacheView::apply(const PanelActions& actions) {
     views_ = savedViewsOf(whole());
   }
   apply(actions.film);
-  if (!actions.error.empty()) reports_.report(actions.error);
+  if (actions.function_changed) reports_.settle(About::kFunction);
+  if (!actions.error.empty()) reports_.report(actions.error, About::kFunction);
 }
 
 void CacheView::ask(bool moving) {

@@ -209,10 +209,11 @@ void CacheView::savePictureIfFinal() {
     const ShownFunctions functions(state_, manifest());
     const AnnotatedScene scene = sceneOf(state_, functions, *shown_, picture_size_);
     writeImage(annotated(shown_->image, state_.annotations, scene), file);
+    reports_.settle(About::kSaving);
     say("saved " + fs::absolute(file).string() +
         (preview_ ? fmt::format(", of the preview ({})", preview_->what) : "") + lacks());
   } catch (const Error& error) {
-    reports_.report(error);
+    reports_.report(error, About::kSaving);
   }
 }
 

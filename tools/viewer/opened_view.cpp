@@ -87,6 +87,7 @@ void OpenedView::show(const PreparedView& prepared, const ViewerOptions& options
   std::vector<std::string> names;
   for (const fs::path& file : files) names.push_back(fs::absolute(file).string());
   surroundings_.settings.opened(std::move(names));
+  surroundings_.reports.settle(About::kOpening);
 }
 
 /// Ends a view on another thread: what it reads and draws is stopped, but not at once.
@@ -214,7 +215,7 @@ void OpenedView::takeWhole() {
     show(*preparation->prepared, options, opening_files_);
   } catch (const Interrupted&) {
   } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
-    surroundings_.reports.report(error);
+    surroundings_.reports.report(error, About::kOpening);
   }
 }
 

@@ -99,7 +99,12 @@ class Viewer {
       begin(std::move(*wanted));
     if (!movie_ || !movie_->isDone()) return;
     const std::unique_ptr<BackgroundJob> done = std::move(movie_);
-    reports_.attempt([&] { reports_.say("saved " + fs::absolute(done->get()).string()); });
+    reports_.attempt(
+        [&] {
+          reports_.say("saved " + fs::absolute(done->get()).string());
+          reports_.settle(About::kSaving);
+        },
+        About::kSaving);
   }
 
   /// Draws what goes on in the background.

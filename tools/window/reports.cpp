@@ -27,7 +27,7 @@ std::string textOf(const TooLittleMemory& error) {
 
 }  // namespace
 
-bool Toasts::add(const std::string& text, double now_s, bool is_error) {
+bool Toasts::add(const std::string& text, double now_s, bool is_error, About about) {
   const double ends_s =
       now_s +
       (is_error ? kErrorSeconds : kShortestSeconds + kPerLetterSeconds * static_cast<double>(text.size()));
@@ -38,7 +38,7 @@ bool Toasts::add(const std::string& text, double now_s, bool is_error) {
     same->ends_s = ends_s;
     return false;
   }
-  shown_.push_back({text, is_error, ends_s});
+  shown_.push_back({text, is_error, ends_s, about});
   if (shown_.size() > kMaxShown) shown_.pop_front();
   log_.push_back(text);
   if (log_.size() > kMaxLog) log_.pop_front();
@@ -50,33 +50,39 @@ const std::deque<Toast>& Toasts::shown(double now_s) {
   return shown_;
 }
 
+void Toasts::settle(About about) {
+  if (about == About::kNothing) return;
+  std::erase_if(shown_, [about](const Toast& toast) { return toast.is_error && toast.about == about; });
+}
+
 void Toasts::remove(size_t n) {
   if (n < shown_.size()) shown_.erase(shown_.begin() + static_cast<ptrdiff_t>(n));
 }
 
-bool Reports::attempt(const std::function<void()>& act) {
+bool Reports::attempt(const std::function<void()>& act, About about) {
   try {
     act();
     return true;
   } catch (const Interrupted&) {
     throw;
   } catch (const std::exception& error) {
-    report(error);
+    report(error, about);
     return false;
   }
 }
 
-void Reports::report(const std::exception& error) {
+void Reports::report(const std::exception& error, About about) {
   if (dynamic_cast<const std::bad_alloc*>(&error))
-    return report(std::string(
-        "out of memory; lower \"memory\" under View, Detail and memory, or close other programs"));
+    return report(std::string("out of memory; lower \"memory\" under View, Detail and memory, or close other "
+                              "programs"),
+                  about);
   if (const auto* const too_little = dynamic_cast<const TooLittleMemory*>(&error))
-    return report(textOf(*too_little));
-  report(oneLine(error.what()));
+    return report(textOf(*too_little), about);
+  report(oneLine(error.what()), about);
 }
 
-void Reports::report(const std::string& text) {
-  if (toasts_.add(text, clock_s_(), true)) printMessage("warning: {}", text);
+void Reports::report(const std::string& text, About about) {
+  if (toasts_.add(text, clock_s_(), true, about)) printMessage("warning: {}", text);
 }
 
 }  // namespace curvisplat

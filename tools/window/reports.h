@@ -2,7 +2,7 @@
 // the one place that decides what happens to an error, wherever it comes from: it is shown over the picture
 // and printed, and the window goes on with what it has. Only Interrupted passes, which ends the program.
 //
-// A message stays long enough to be read. An error stays until it is clicked away, or for a minute. Nothing
+// A message stays long enough to be read. An error stays until it is clicked away, until what failed succeeds, or for a minute. Nothing
 // here knows the window. For the window's thread.
 #pragma once
 
@@ -13,17 +13,23 @@
 
 namespace curvisplat {
 
+/// What an error is about: it goes when the next attempt at the same succeeds.
+enum class About { kNothing, kOpening, kPicture, kSaving, kFunction };
+
 struct Toast {
   std::string text;
   bool is_error = false;
   double ends_s = 0;
+  About about = About::kNothing;  // of an error
 };
 
 /// The messages that are shown, and the last ones, which can be read again. A value type.
 class Toasts {
  public:
   /// `now_s` is any clock's. The same text again only stays longer: then it returns false.
-  bool add(const std::string& text, double now_s, bool is_error = false);
+  bool add(const std::string& text, double now_s, bool is_error = false, About about = About::kNothing);
+  /// Removes the errors about something that has succeeded.
+  void settle(About about);
   /// The messages to show at `now_s`, the newest last.
   const std::deque<Toast>& shown(double now_s);
   /// Removes one of shown() now.
@@ -45,11 +51,13 @@ class Reports {
   Reports(Toasts& toasts, double (*clock_s)()) : toasts_(toasts), clock_s_(clock_s) {}
 
   void say(const std::string& text) { toasts_.add(text, clock_s_()); }
-  /// Does `act`. Returns false if it threw an error, which is reported.
-  bool attempt(const std::function<void()>& act);
+  /// Does `act`. Returns false if it threw an error, which is reported as one about this.
+  bool attempt(const std::function<void()>& act, About about = About::kNothing);
   /// Shows and prints the error, but not again while it is shown.
-  void report(const std::exception& error);
-  void report(const std::string& text);
+  void report(const std::exception& error, About about = About::kNothing);
+  void report(const std::string& text, About about = About::kNothing);
+  /// It has succeeded.
+  void settle(About about) { toasts_.settle(about); }
 
  private:
   Toasts& toasts_;
