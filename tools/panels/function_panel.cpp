@@ -34,6 +34,13 @@ const TransferFunctionDefinition& definitionOf(const std::string& map) {
   return found != made.end() ? found->second : made.emplace(map, presetDefinition(map)).first->second;
 }
 
+/// Draws the heading of a column of this width; the last one, of width 0, ends the line.
+void columnHeading(const char* text, float width) {
+  const float next = ImGui::GetCursorPosX() + width + ImGui::GetStyle().ItemSpacing.x;
+  ImGui::TextDisabled("%s", text);
+  if (width > 0) ImGui::SameLine(next);
+}
+
 std::optional<size_t> pointNear(const EditedFunction& function, const CurveCanvas& canvas,
                                 const ImVec2& mouse) {
   std::optional<size_t> nearest;
@@ -158,6 +165,8 @@ bool FunctionPanel::drawPoints(EditedFunction& function) {
   bool changed = false;
   size_t removed = 0;
   const float half = 0.38f * ImGui::GetContentRegionAvail().x;
+  columnHeading("scalar", half);
+  columnHeading("opacity", 0);
   for (size_t n = 0; n < function.points().size(); ++n) {
     const OpacityPoint point = function.points()[n];
     const bool end = n == 0 || n + 1 == function.points().size();
@@ -243,6 +252,8 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
   }
   bool changed = false;
   size_t removed = 0;
+  columnHeading("colour", ImGui::CalcTextSize("colour").x);
+  columnHeading("scalar", 0);
   for (size_t n = 0; n < function.colours().size(); ++n) {
     const ColourPoint point = function.colours()[n];
     const bool end = n == 0 || n + 1 == function.colours().size();
@@ -254,7 +265,8 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
       changed = true;
     }
     nameWidget(fmt::format("colour {}", n + 1));
-    ImGui::SameLine();
+    ImGui::SameLine(0, ImGui::CalcTextSize("colour").x - ImGui::GetFrameHeight() +
+                           ImGui::GetStyle().ItemSpacing.x);
     const double scalar = function.scalarAt(point.x);
     ImGui::SetNextItemWidth(0.4f * ImGui::GetContentRegionAvail().x);
     ImGui::BeginDisabled(end);

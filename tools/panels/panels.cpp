@@ -396,6 +396,9 @@ const char* stateOfPicture(const ShownStatistics& shown) {
 
 void drawStatistics(const ViewState& state, const ShownStatistics& shown) {
   if (!ImGui::BeginTable("statistics", 2, ImGuiTableFlags_SizingFixedFit)) return;
+  ImGui::TableSetupColumn("cost");
+  ImGui::TableSetupColumn("of the picture that is shown");
+  ImGui::TableHeadersRow();
   row("picture", stateOfPicture(shown));
   if (const FrameStatistics* s = shown.statistics) {
     row("frame", milliseconds(s->total_s));

@@ -292,6 +292,9 @@ void drawKeys(bool& open, Window& window) {
       ImGui::TextUnformatted(what);
     };
     if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_RowBg)) {
+      ImGui::TableSetupColumn("key or mouse");
+      ImGui::TableSetupColumn("what it does");
+      ImGui::TableHeadersRow();
       for (const auto& [key, what] : kMouse) row(key, what);
       for (const CommandInfo& info : commands())
         if (*info.key_name) row(info.key_name, info.label);
