@@ -141,6 +141,21 @@ TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
   expectDraws(commands[1], moved);
 }
 
+/// The frame of a cut is hidden, and the cut is not.
+TEST_F(WindowPanels, FramesOfCutsAreHiddenAlone) {
+  open();
+  choose("Picture", "Add a clip plane");
+  placeOf("handle 1");
+  const Image with_frame = save();
+  tab("Objects");
+  click("Frames of cuts");
+  EXPECT_TRUE(gone("handle 1"));
+  EXPECT_GE(difference(save(), with_frame), 50);
+  click("Frames of cuts");
+  placeOf("handle 1");
+  close();
+}
+
 TEST_F(WindowPanels, WhatTheMenuAddsIsUnfolded) {
   open();
   save();  // it hears

@@ -100,6 +100,8 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted("volume");
   ImGui::EndDisabled();
+  ImGui::SameLine(0.5f * ImGui::GetContentRegionMax().x);
+  commandOption(Command::kPlaneFrames, actions, "frames of cuts", facts.shows_frames);
   surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
   cuts_.draw(state, actions);
   std::optional<size_t> seen = state.markers.size();  // a click in the picture unfolds nothing

@@ -39,7 +39,7 @@ void drawStatistics(const ViewState& state, const ShownStatistics& shown);
 /// Facts that the panels display but cannot change.
 struct PanelFacts {
   ShownStatistics shown;
-  bool flies = false;
+  bool flies = false, shows_frames = true;
   Playback* playback = nullptr;    // of a series; the panels set its speed and loop
   std::vector<std::string> views;  // saved ones, by name
   Rectangle place;                 // of the panels in the window

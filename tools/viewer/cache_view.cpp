@@ -279,6 +279,7 @@ PanelActions CacheView::drawPanels(const WindowLayout& layout) {
   PanelFacts facts;
   facts.shown = {shown_ ? &shown_->statistics : nullptr, isFinal(), isRefining(), frames_->backendName()};
   facts.flies = navigation_.flies();
+  facts.shows_frames = shows_frames_;
   facts.playback = &playback_;
   facts.views = views_;
   facts.faces = &face_names_;

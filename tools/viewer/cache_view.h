@@ -200,6 +200,7 @@ class CacheView {
   History history_;
   Panels panels_;
   PlaneHandles handles_;
+  bool shows_frames_ = true;  // of clip planes, slices and the clip box
   Playback playback_;
   Navigation navigation_;
   const Backend backend_;

@@ -74,6 +74,8 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
        [](const View& v) { return v.state_.annotations.axes_grid; }},
       {Command::kOutline, [](View& v) { v.toggle(v.state_.annotations.outline); }, nullptr,
        [](const View& v) { return v.state_.annotations.outline; }},
+      {Command::kPlaneFrames, [](View& v) { v.shows_frames_ = !v.shows_frames_; }, nullptr,
+       [](const View& v) { return v.shows_frames_; }},
       {Command::kAddClipPlane, [](View& v) { v.addPlaneTo(v.state_.clip_planes); },
        [](const View& v) { return v.state_.clip_planes.size() < kMaxClipPlanes; }},
       {Command::kAddSlice, [](View& v) { v.addPlaneTo(v.state_.slices); },

@@ -73,8 +73,8 @@ void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
   list->PushClipRect(toImGui(whole.x, whole.y),
                      toImGui(whole.x + (1 - shown_strip_) * whole.width, whole.y + whole.height));
   drawMarkerSigns(state_, place);
-  changed_ |=
-      handles_.draw(state_, manifest(), place, window_);  // over the signs: they are what one takes hold of
+  // Over the signs: they are what one takes hold of.
+  if (shows_frames_) changed_ |= handles_.draw(state_, manifest(), place, window_);
   list->PopClipRect();
 }
 

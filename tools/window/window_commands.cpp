@@ -58,6 +58,7 @@ constexpr std::array kCommands{
     CommandInfo{Command::kAxes, "Picture", "Axes"},
     CommandInfo{Command::kAxesGrid, "Picture", "Axes with numbers"},
     CommandInfo{Command::kOutline, "Picture", "Outline"},
+    CommandInfo{Command::kPlaneFrames, "Picture", "Frames of cuts"},
     CommandInfo{Command::kAddClipPlane, "Picture", "Add a clip plane", 0, false, false, "", kGroup},
     CommandInfo{Command::kAddSlice, "Picture", "Add a slice"},
     CommandInfo{Command::kAddIsosurface, "Picture", "Add an isosurface"},

@@ -49,6 +49,7 @@ enum class Command {
   kOutline,
   kLight,
   kDarkBackground,
+  kPlaneFrames,
   kAddClipPlane,
   kAddSlice,
   kAddIsosurface,
