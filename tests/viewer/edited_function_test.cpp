@@ -100,6 +100,25 @@ TEST(EditedFunction, AnIsosurfaceBeginsInTheMiddleOfWhatIsSeen) {
   EXPECT_NEAR(middleOfSeen({0, 1, 0, 0}, function), 10 + 10 * 0.375, 1e-9);
 }
 
+/// Opacities and their unit are of a scalar, a colour map is the user's.
+TEST(EditedFunction, OfAnotherScalarIsChosenAnew) {
+  const EditedFunction automatic =
+      EditedFunction::automatic({kMapsOnDark.diverging, {-3, 3}, {}, {{0, 1}, {0.5, 0}, {1, 1}}, 0.25});
+  EditedFunction edited(kMapsOnDark.sequential, 0, 100, 7);
+  edited.addPoint(0.5, 0.9);
+  const EditedFunction anew = chosenAnew(edited, automatic);
+  EXPECT_TRUE(anew.isAutomatic());
+  EXPECT_EQ(anew.map(), kMapsOnDark.diverging);
+  EXPECT_EQ(anew.opacityUnit(), 0.25);
+  edited.setColours("viridis");
+  const EditedFunction with_map = chosenAnew(edited, automatic);
+  EXPECT_EQ(with_map.map(), "viridis");
+  EXPECT_EQ(with_map.range(), automatic.range());
+  EXPECT_EQ(with_map.opacityUnit(), 0.25);
+  ASSERT_EQ(with_map.points().size(), 3u);
+  EXPECT_EQ(with_map.points()[1].opacity, 0);
+}
+
 TEST(EditedFunction, InvalidRangesAreRefused) {
   EditedFunction edited("grey", -1, 1, 1);
   EXPECT_FALSE(edited.setLogScale(true));

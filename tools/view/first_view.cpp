@@ -60,11 +60,19 @@ double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& 
                            count);
 }
 
+EditedFunction chosenAnew(const EditedFunction& before, EditedFunction automatic) {
+  const std::string& map = before.map();
+  const bool is_default = map == kMapsOnDark.sequential || map == kMapsOnDark.diverging ||
+                          map == kMapsOnLight.sequential || map == kMapsOnLight.diverging;
+  if (!before.isAutomatic() && !map.empty() && !is_default) automatic.setColours(map);
+  return automatic;
+}
+
 void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name) {
-  std::optional<EditedFunction> chosen;  // first: where reading fails, the state stays as it was
-  if (state.function.isAutomatic()) chosen = automaticFunction(cache, name);
+  // First: where reading fails, the state stays as it was.
+  EditedFunction chosen = chosenAnew(state.function, automaticFunction(cache, name));
   chooseVariable(state, cache.manifest(), name);
-  if (chosen) state.function = *std::move(chosen);
+  state.function = std::move(chosen);
   state.suitBackground();
 }
 

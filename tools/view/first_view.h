@@ -27,8 +27,12 @@ EditedFunction automaticFunction(const CacheReader& cache, const std::string& sc
 /// transparent it divides the volume, and without any volume the range. `histogram`: as of histogramOf().
 double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function);
 
-/// Selects another scalar. An automatic function is chosen anew; another keeps its points over the scalar's
-/// range. Throws UsageError that lists the scalars if there is none of this name.
+/// The function of another scalar, after `before`: the automatic one, with its opacities and their unit, which those of the
+/// scalar before do not suit. A colour map that the user has chosen stays.
+EditedFunction chosenAnew(const EditedFunction& before, EditedFunction automatic);
+
+/// Selects another scalar, whose function is chosen anew. Throws UsageError that lists the scalars if there is none of this
+/// name.
 void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name);
 
 /// Finds automatic functions on another thread. A question for one purpose replaces the one before for the

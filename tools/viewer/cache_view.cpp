@@ -129,10 +129,12 @@ void CacheView::takeRequestsOf(CacheView& before) {
 ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOptions& options) const {
   if (!options.carried) return prepared.state;
   ViewState state = options.carried->state;
-  if (options.scalar && *options.scalar != state.variable) chooseVariable(state, manifest(), *options.scalar);
-  if (!state.function.isAutomatic()) return state;
-  state.function =
-      state.variable == prepared.scalar ? prepared.automatic : automaticFunction(cache_, state.variable);
+  const bool is_other = options.scalar && *options.scalar != state.variable;
+  if (is_other) chooseVariable(state, manifest(), *options.scalar);
+  if (!is_other && !state.function.isAutomatic()) return state;
+  state.function = chosenAnew(state.function, state.variable == prepared.scalar
+                                                  ? prepared.automatic
+                                                  : automaticFunction(cache_, state.variable));
   state.suitBackground();
   return state;
 }

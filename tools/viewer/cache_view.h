@@ -69,8 +69,7 @@ class CacheView {
   /// Applies a command that is not the window's own.
   void run(Command command);
   void choose(const MenuChoice& choice);
-  /// Shows another scalar. If the function is chosen from the data, it changes with the function, as soon as
-  /// that is found.
+  /// Shows another scalar, as soon as its function has been chosen from the data.
   void chooseScalar(const std::string& name);
   void showScalar(const std::string& name);
   /// An empty name: the opacities are of the same scalar.

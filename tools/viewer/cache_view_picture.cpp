@@ -399,9 +399,8 @@ void CacheView::chooseScalar(const std::string& name) {
     return;
   }
   const bool is_shown = name == state_.variable;
-  if (!is_shown && state_.function.isAutomatic()) return chooser_.ask({For::kScalar, name});
+  if (!is_shown) return chooser_.ask({For::kScalar, name});
   chooser_.drop(For::kScalar);  // one that was chosen before
-  if (!is_shown) showScalar(name);
 }
 
 void CacheView::showScalar(const std::string& name) {
@@ -463,16 +462,16 @@ void CacheView::takeSurface() {
   changed_ = true;
 }
 
-/// Takes the function that the chooser has found. What the user has edited meanwhile stays.
+/// Takes the function that the chooser has found.
 void CacheView::takeFunction() {
   const auto found = chooser_.poll();
   if (!found) return;
   const auto& [question, function] = *found;
   switch (question.what) {
     case FunctionChooser::For::kScalar: {
-      const bool is_automatic = state_.function.isAutomatic();
+      EditedFunction chosen = chosenAnew(state_.function, function);
       showScalar(question.scalar);
-      if (is_automatic) state_.function = function;
+      state_.function = std::move(chosen);
       state_.suitBackground();
       return;
     }
