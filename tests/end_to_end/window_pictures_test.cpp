@@ -310,15 +310,29 @@ TEST_F(WindowMovie, OneThatIsStoppedLeavesNothing) {
 
 TEST_F(WindowMovie, IsAFileThatPlays) {
   if (!fs::exists("/usr/bin/ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
-  open({}, {481, 361});  // H.264 needs an even size
-  saveMovie("Save movie: once around...", "movie/m.mp4");
+  open({}, {481, 361});
+  choose("File", "Save movie: once around...");
+  placeOf("movie of pictures a second: 90 pictures, 3.6 s");
+  const auto type = [&](const std::string& field, const std::string& number) {
+    click(field);
+    press("ctrl+a");
+    act({"type", number});
+    press("Tab");
+  };
+  type("picture width", "201");  // H.264 needs an even size
+  placeOf("picture of 201 x " + std::to_string(pictureSize().height));
+  type("movie rate", "10");
+  placeOf("movie of pictures a second: 90 pictures, 9.0 s");
+  click("file name");
+  answer("movie/m.mp4");
   EXPECT_TRUE(isSaved());
   close();
-  const ProgramResult frames = RunningProgram({"ffprobe", "-v", "error", "-count_frames", "-show_entries",
-                                               "stream=nb_read_frames", "-of", "csv=p=0", "movie/m.mp4"},
-                                              "/usr/bin/env")
-                                   .wait();
-  EXPECT_EQ(frames.out.substr(0, 2), "90") << frames.err;
+  const ProgramResult frames =
+      RunningProgram({"ffprobe", "-v", "error", "-count_frames", "-show_entries",
+                      "stream=width,r_frame_rate,nb_read_frames", "-of", "csv=p=0", "movie/m.mp4"},
+                     "/usr/bin/env")
+          .wait();
+  EXPECT_EQ(frames.out.substr(0, frames.out.find('\n')), "200,10/1,90") << frames.err;
 }
 
 TEST_F(WindowMovie, AnEndingThatCannotBeWrittenIsSaid) {

@@ -43,8 +43,8 @@ std::optional<size_t> FilmEdit::selected() const {
   return static_cast<size_t>(key - keys_.begin());
 }
 
-uint64_t FilmEdit::frames() const {
-  return 1 + static_cast<uint64_t>(std::llround(kFramesPerSecond * (end() - begin())));
+uint64_t FilmEdit::frames(double frames_per_s) const {
+  return 1 + static_cast<uint64_t>(std::llround(frames_per_s * (end() - begin())));
 }
 
 FilmEdit::Key FilmEdit::keyOf(const ViewState& state, std::optional<double> series_time) {

@@ -41,7 +41,7 @@ class FilmEdit {
   /// The film. Null without key frames.
   const std::shared_ptr<const Film>& film() const { return film_; }
   /// The frames of a movie of it.
-  uint64_t frames() const;
+  uint64_t frames(double frames_per_s = kFramesPerSecond) const;
 
   /// Adds the view at time(), or behind the selected key frame: half way to the next, or kApart after the last. Goes there.
   /// `series_time`: of a series. Throws Error if it does not suit the others, as a view of another projection or scalar.

@@ -129,8 +129,9 @@ class CacheView {
   void colourFaces(const std::string& scalar);
   void findIsosurface(const std::string& scalar, std::optional<size_t> replaced = {});
   void takeIsosurfaces();
-  void saveMovieTo(const std::filesystem::path& file);
-  MovieRequest newMovie(const std::filesystem::path& file) const;
+  void saveMovieTo(const std::filesystem::path& file, ImageSize size,
+                   std::optional<double> frames_per_s = {});
+  MovieRequest newMovie(const std::filesystem::path& file, std::optional<double> frames_per_s = {}) const;
   void apply(const FilmActions& actions);
   void addKeyFrame(bool replaces);
   ViewState stateOfFilm() const;

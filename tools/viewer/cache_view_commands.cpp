@@ -168,7 +168,12 @@ void CacheView::takeIsosurfaces() {
 
 void CacheView::saveMovieOf(MovieKind kind) {
   movie_kind_ = kind;
-  dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", textOf(newMovie({})));
+  const MovieRequest movie = newMovie({});
+  FileDialog::MovieOffer offer{movie.size, movie.frames_per_s, {}};
+  offer.frames = [this, frames = framesOf(movie), kind](double rate) {
+    return kind == MovieKind::kFilm ? film_.frames(rate) : frames;
+  };
+  dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", std::move(offer));
 }
 
 void CacheView::moveCamera(Command command) {

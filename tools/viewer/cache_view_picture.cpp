@@ -230,26 +230,34 @@ std::string CacheView::timeOption(bool of_film) const {
 /// window is in it.
 void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
   movie_kind_ = MovieKind::kOnePicture;
-  saveMovieTo(file);
-  wanted_movie_->size = size;
-  wanted_movie_->state.camera = holding(state_.camera, data_size_, dataSizeOf(state_, manifest(), size));
+  saveMovieTo(file, size);
 }
 
-/// Saves a movie of what is shown now, whatever is changed while it is drawn.
-void CacheView::saveMovieTo(const fs::path& file) {
+/// Saves a movie of what is shown now, whatever is changed while it is drawn. `frames_per_s`: nullopt: as usual.
+void CacheView::saveMovieTo(const fs::path& file, ImageSize size, std::optional<double> frames_per_s) {
   if (movie_kind_ == MovieKind::kFilm && !film_.film()) return;  // its key frames were removed meanwhile
-  wanted_movie_ = newMovie(file);
+  MovieRequest movie = newMovie(file, frames_per_s);
+  const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
+  const ImageSize data = dataSizeOf(state_, manifest(), size);
+  movie.size = size;
+  movie.state.camera = holding(movie.state.camera, data_size_, data);
+  movie.magnification = std::min(1.0, aspect(data) / aspect(data_size_));
+  wanted_movie_ = std::move(movie);
 }
 
-MovieRequest CacheView::newMovie(const fs::path& file) const {
+MovieRequest CacheView::newMovie(const fs::path& file, std::optional<double> frames_per_s) const {
   if (movie_kind_ == MovieKind::kFilm) {
+    const double rate = frames_per_s.value_or(FilmEdit::kFramesPerSecond);
+    const uint64_t frames = film_.frames(rate);
     std::vector<double> times;
-    for (uint64_t frame = 0; frame < film_.frames(); ++frame)
-      times.push_back(film_.film()->timeOf(frame, film_.frames()));
-    return filmMovie(file, std::move(times));
+    for (uint64_t frame = 0; frame < frames; ++frame) times.push_back(film_.film()->timeOf(frame, frames));
+    MovieRequest movie = filmMovie(file, std::move(times));
+    movie.frames_per_s = rate;
+    return movie;
   }
   MovieRequest movie{movie_kind_, file, cache_.at(playback_.position()), state_, picture_size_};
   if (movie_kind_ == MovieKind::kAllSteps) movie.frames_per_s = playback_.stepsPerSecond();
+  movie.frames_per_s = frames_per_s.value_or(movie.frames_per_s);
   movie.backend = backend_;
   movie.faces_at = faces_at_;
   movie.keep_going = !damaged_.empty();
@@ -321,7 +329,7 @@ void CacheView::use(const FileDialog::Chosen& chosen) {
       case FileDialog::Purpose::kOpenSurface:
         return readSurface(file);
       case FileDialog::Purpose::kSaveMovie:
-        return saveMovieTo(file);
+        return saveMovieTo(file, *chosen.size, chosen.frames_per_s);
       case FileDialog::Purpose::kOpenFilm:
         return openFilm(file);
       case FileDialog::Purpose::kSaveFilm:

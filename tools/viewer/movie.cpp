@@ -152,12 +152,6 @@ uint64_t framesOf(const MovieRequest& movie) {
   return 0;
 }
 
-std::string textOf(const MovieRequest& movie) {
-  const uint64_t frames = framesOf(movie);
-  return fmt::format("{} pictures of {} x {}, {:.1f} s", frames, movie.size.width, movie.size.height,
-                     static_cast<double>(frames) / movie.frames_per_s);
-}
-
 std::filesystem::path movieNameOf(const std::filesystem::path& file) {
   if (!isImageName(file) || file.filename().string().find('%') != std::string::npos) return file;
   return file.parent_path() / (file.stem().string() + "_%04d" + file.extension().string());

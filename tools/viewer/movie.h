@@ -53,8 +53,6 @@ struct MovieRequest {
 
 /// Frames of a movie: 90 once around, as `render --orbit 360` draws; one a time step; of a film those of its times; or one.
 uint64_t framesOf(const MovieRequest& movie);
-/// "90 pictures of 1280 x 800, 3.6 s".
-std::string textOf(const MovieRequest& movie);
 
 /// The name under which a movie named so is written: as it is, or with the frame's number if it is of
 /// pictures: "a.png" -> "a_%04d.png".

@@ -31,11 +31,12 @@ struct Look {
 /// The endings of what is read (FORMATS.md), without those of compressed files.
 const std::vector<std::string>& dataEndings() {
   static const std::vector<std::string> endings{
-      ".splats", ".p3d", ".xyz", ".x", ".g", ".grd", ".grid", ".q", ".f", ".fun", ".fmt", ".bin", ".dat",
-      ".vts", ".vtr", ".vti", ".vtu", ".pvts", ".pvtr", ".pvti", ".pvtu", ".vtm", ".vtmb", ".vtpd", ".vth",
-      ".vthb", ".pvd", ".vtk", ".vtkhdf", ".hdf", ".hdf5", ".h5", ".series", ".cgns", ".adf", ".nc", ".nc4",
-      ".cdf", ".netcdf", ".zip", ".zarr", ".case", ".encas", ".tec", ".tp", ".plt", ".xmf", ".xdmf", ".foam",
-      ".msh", ".e", ".ex2", ".exo", ".exii", ".su2", ".csv"};
+      ".splats", ".p3d",  ".xyz",    ".x",    ".g",   ".grd",  ".grid", ".q",    ".f",      ".fun",
+      ".fmt",    ".bin",  ".dat",    ".vts",  ".vtr", ".vti",  ".vtu",  ".pvts", ".pvtr",   ".pvti",
+      ".pvtu",   ".vtm",  ".vtmb",   ".vtpd", ".vth", ".vthb", ".pvd",  ".vtk",  ".vtkhdf", ".hdf",
+      ".hdf5",   ".h5",   ".series", ".cgns", ".adf", ".nc",   ".nc4",  ".cdf",  ".netcdf", ".zip",
+      ".zarr",   ".case", ".encas",  ".tec",  ".tp",  ".plt",  ".xmf",  ".xdmf", ".foam",   ".msh",
+      ".e",      ".ex2",  ".exo",    ".exii", ".su2", ".csv"};
   return endings;
 }
 
@@ -127,9 +128,10 @@ void FileDialog::openToSavePicture(const std::string& name, ImageSize size) {
   size_ = offered_size_ = size;
 }
 
-void FileDialog::openToSaveMovie(const std::string& name, const std::string& about) {
+void FileDialog::openToSaveMovie(const std::string& name, MovieOffer offer) {
   open(Purpose::kSaveMovie, name);
-  about_ = about;
+  size_ = offered_size_ = offer.size;
+  movie_ = std::move(offer);
 }
 
 void FileDialog::enter(const fs::path& folder) {
@@ -175,11 +177,8 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   // Dear ImGui gives a field no letters in the frame in which it gets the focus.
   frames_to_focus_ = ImGui::IsItemActive() ? 0 : std::max(0, frames_to_focus_ - 1);
   if (frames_to_focus_ > 0) window.holdInput();
-  if (*purpose_ == Purpose::kSavePicture) drawSize();
-  if (*purpose_ == Purpose::kSaveMovie) {
-    ImGui::TextUnformatted(about_.c_str());
-    nameWidget("movie of " + about_);
-  }
+  if (*purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie) drawSize();
+  if (*purpose_ == Purpose::kSaveMovie) drawRate();
   accepts |= ImGui::Button(look.button);
   nameWidget("file accept");
   ImGui::SameLine();
@@ -211,8 +210,10 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
 }
 
 float FileDialog::heightBelow() const {
-  const bool has_size = *purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie;
-  return (has_size ? 3.6f : 2.6f) * ImGui::GetFrameHeightWithSpacing();
+  const float lines = *purpose_ == Purpose::kSavePicture ? 3.6f
+                      : *purpose_ == Purpose::kSaveMovie ? 4.6f
+                                                         : 2.6f;
+  return lines * ImGui::GetFrameHeightWithSpacing();
 }
 
 /// Draws the dialog's keys in the place of the files.
@@ -269,6 +270,24 @@ void FileDialog::drawSize() {
         {std::min(kMaxSide, 2 * offered_size_.width), std::min(kMaxSide, 2 * offered_size_.height)});
   offer("1920 x 1080", {1920, 1080});
   offer("3840 x 2160", {3840, 2160});
+}
+
+/// Pictures a second, and how long that takes.
+void FileDialog::drawRate() {
+  constexpr double kMax = 120;
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted("rate");
+  ImGui::SameLine();
+  ImGui::SetNextItemWidth(5 * ImGui::GetFontSize());
+  ImGui::InputDouble("##rate", &movie_.frames_per_s, 0, 0, "%.4g");
+  nameWidget("movie rate");
+  movie_.frames_per_s = std::clamp(movie_.frames_per_s, 1.0, kMax);
+  ImGui::SameLine();
+  const uint64_t frames = movie_.frames(movie_.frames_per_s);
+  const std::string text = fmt::format("pictures a second: {} pictures, {:.1f} s", frames,
+                                       static_cast<double>(frames) / movie_.frames_per_s);
+  ImGui::TextUnformatted(text.c_str());
+  nameWidget("movie of " + text);
 }
 
 /// A click takes a name, with Control several; a double click opens.
@@ -348,7 +367,8 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
       return std::nullopt;
     }
     chosen.files.push_back(path);
-    if (*purpose_ == Purpose::kSavePicture) chosen.size = size_;
+    if (*purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie) chosen.size = size_;
+    if (*purpose_ == Purpose::kSaveMovie) chosen.frames_per_s = movie_.frames_per_s;
     return chosen;
   }
   if (fs::exists(whole(name_), ignored)) {

@@ -46,7 +46,14 @@ class FileDialog {
   struct Chosen {
     Purpose purpose;
     std::vector<std::filesystem::path> files;
-    std::optional<ImageSize> size = std::nullopt;  // of a picture
+    std::optional<ImageSize> size = std::nullopt;  // of a picture or a movie
+    double frames_per_s = 0;                       // of a movie
+  };
+  /// Size and rate of a movie, which can be changed.
+  struct MovieOffer {
+    ImageSize size{0, 0};
+    double frames_per_s = 25;
+    std::function<uint64_t(double frames_per_s)> frames = {};  // how many pictures it has at that rate
   };
 
   /// `is_grid_folder` may be empty: no folder is. `data_folder`: where data were opened last; may be empty.
@@ -57,8 +64,8 @@ class FileDialog {
   void open(Purpose purpose, const std::string& name = "");
   /// The same, to save a picture; `size` is offered, and can be changed.
   void openToSavePicture(const std::string& name, ImageSize size);
-  /// The same, to save a movie; `about`: its pictures and how long it plays.
-  void openToSaveMovie(const std::string& name, const std::string& about);
+  /// The same, to save a movie.
+  void openToSaveMovie(const std::string& name, MovieOffer offer);
   bool isOpen() const { return purpose_.has_value(); }
   /// Shows the dialog's keys in the place of the files, or the files again.
   void toggleHelp() { help_ = !help_; }
@@ -75,6 +82,7 @@ class FileDialog {
   bool isTaken(const std::string& name) const;
   std::optional<Chosen> accept();
   void drawSize();
+  void drawRate();
 
   const IsGridFolder is_grid_folder_;
   std::optional<Purpose> purpose_;
@@ -86,8 +94,9 @@ class FileDialog {
   std::vector<FolderEntry> entries_;
   std::vector<std::string> taken_;  // names that were clicked
   std::string taken_text_;          // them, as they were put into `name_`
-  std::string name_, error_, overwrites_, about_;
-  ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture
+  std::string name_, error_, overwrites_;
+  ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture or a movie
+  MovieOffer movie_;
 };
 
 }  // namespace curvisplat
