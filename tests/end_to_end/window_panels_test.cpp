@@ -156,6 +156,27 @@ TEST_F(WindowPanels, FramesOfCutsAreHiddenAlone) {
   close();
 }
 
+TEST_F(WindowPanels, TheLightHasStrengthAndDirection) {
+  open({}, kScreen);
+  tab("View");
+  click("light");
+  const Image at_viewer = save();
+  click("light at the viewer");
+  click(placeOf("light azimuth", 0.75));
+  const Image aside = saveAndCopy();
+  EXPECT_LT(difference(at_viewer, aside), 45);
+  click(placeOf("light strength", 0.2));
+  const Image weak = saveAndCopy();
+  EXPECT_LT(difference(aside, weak), 45);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_NE(valueOf(commands[0], "--light-direction"), "");
+  EXPECT_EQ(valueOf(commands[0], "--light"), "");
+  EXPECT_NE(valueOf(commands[1], "--light"), "");
+  expectDraws(commands[0], aside);
+  expectDraws(commands[1], weak);
+}
+
 TEST_F(WindowPanels, WhatTheMenuAddsIsUnfolded) {
   open();
   save();  // it hears

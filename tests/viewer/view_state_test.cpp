@@ -42,6 +42,8 @@ ViewState changedState() {
   state.lit = true;
   state.shadow = 0.5;
   state.ambient_occlusion = 0.25;
+  state.light_strength = 0.5;
+  state.light_direction = {1, 0, 2};
   state.gradient_opacity = {{0, 0.25}, {0.5, 1}, {1, 0}};
   state.dark = true;
   state.annotations.axes = false;
@@ -70,7 +72,8 @@ TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
        {"clip_planes", "surfaces", "faces", "faces_by", "isovalues", "isosurfaces", "iso_opacity",
         "isosurfaces_by_function", "slices", "slice_opacity", "slices_by_function", "volume"})
     json.erase(field);
-  for (const char* field : {"lit", "shadow", "ambient_occlusion"}) json.erase(field);
+  for (const char* field : {"lit", "shadow", "ambient_occlusion", "light_strength", "light_direction"})
+    json.erase(field);
   json.erase("gradient_opacity");
   const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
   EXPECT_TRUE(state.clip_planes.empty());
@@ -82,6 +85,8 @@ TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   EXPECT_TRUE(state.volume);
   EXPECT_FALSE(state.lit);
   EXPECT_EQ(state.shadow + state.ambient_occlusion, 0);
+  EXPECT_EQ(state.light_strength, ViewState::kLightStrength);
+  EXPECT_FALSE(state.light_direction);
   EXPECT_TRUE(state.gradient_opacity.empty());
 }
 
@@ -108,6 +113,8 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/camera", nullptr, "camera");
   expectError("/gradient_opacity", "0.5", "gradient_opacity");
   expectError("/shadow", 2, "shadow");
+  expectError("/light_strength", 2, "light_strength");
+  expectError("/light_direction", nlohmann::json::array({0, 0, 0}), "light_direction");
   expectError("/scale", nlohmann::json::array({1, 1, 0}), "scale");
   expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
   expectError("/clip_planes", 3, "clip_planes");
@@ -274,6 +281,8 @@ TEST(RenderCommand, HasEveryOption) {
   state.lit = true;
   state.shadow = 0.5;
   state.ambient_occlusion = 0.25;
+  state.light_strength = 0.5;
+  state.light_direction = {1, -0.5, 2};
   state.dark = false;
   state.gradient_opacity = {{0, 0.25}, {0.5, 1}, {1, 0}};
   state.annotations = {.scalar_bar = true, .outline = true};
@@ -289,7 +298,8 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--clip-box 0,1,-0.5,1,0.25,1",
                                                   "--clip-plane 0,0.5,0,1,0,-2",
                                                   "--clip-plane 0.25,0,0,0,1,0",
-                                                  "--shade --shadow 0.5 --ambient-occlusion 0.25",
+                                                  "--shade --light 0.5,0.5,0.25 --light-direction 1,-0.5,2",
+                                                  "--shadow 0.5 --ambient-occlusion 0.25",
                                                   "--gradient-opacity 0:0.25,0.5:1,1:0",
                                                   "--background white",
                                                   "--classify flat",

@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/trigonometric.hpp>
+#include <optional>
 
+#include "render/project/light.h"
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 #include "tools/panels/labels.h"
@@ -232,6 +235,40 @@ void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t ste
 
 namespace {
 
+/// Draws strength and direction of the light.
+void drawLight(ViewState& state, PanelActions& actions) {
+  const auto slide = [&](const char* name, double& value, double low, double high, const char* format) {
+    label(name);
+    const bool slides = ImGui::SliderScalar(fmt::format("##{}", name).c_str(), ImGuiDataType_Double, &value,
+                                            &low, &high, format, ImGuiSliderFlags_AlwaysClamp);
+    actions.dragging |= ImGui::IsItemActive();
+    actions.changed |= slides;
+    nameWidget(name);
+    return slides;
+  };
+  slide("light strength", state.light_strength, 0, 1, "%.2f");
+  hint("the rest is the same everywhere");
+  bool at_viewer = !state.lightFrom();
+  ImGui::BeginDisabled(!state.light_direction && state.shadow > 0);  // which needs a direction
+  if (option("light at the viewer", at_viewer)) {
+    state.light_direction = at_viewer ? std::nullopt : std::optional(Light::kShadowsFrom);
+    actions.changed = true;
+  }
+  ImGui::EndDisabled();
+  const glm::dvec3 from = state.lightFrom().value_or(Light::kShadowsFrom);
+  double azimuth = glm::degrees(std::atan2(from.y, from.x));
+  double elevation = glm::degrees(std::atan2(from.z, std::hypot(from.x, from.y)));
+  ImGui::BeginDisabled(at_viewer);
+  bool moves = slide("light azimuth", azimuth, -180, 180, "%.0f°");
+  hint("from x towards y");
+  // Straight from above it would have no azimuth.
+  moves |= slide("light elevation", elevation, -89, 89, "%.0f°");
+  ImGui::EndDisabled();
+  if (!moves) return;
+  const double a = glm::radians(azimuth), e = glm::radians(elevation);
+  state.light_direction = glm::dvec3(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+}
+
 /// Draws how the picture looks around the data.
 void drawSurroundings(ViewState& state, PanelActions& actions) {
   const float column = 0.5f * ImGui::GetContentRegionAvail().x;
@@ -264,7 +301,10 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
     nameWidget(name);
     hint(help);
   };
-  darkness("shadow", "##shadow", state.shadow, "of the volume, in a light from x, -y and above; 0: none");
+  drawLight(state, actions);
+  darkness("shadow", "##shadow", state.shadow,
+           "of the volume, in a light that is not at the viewer (from x, -y and above, unless it is moved); "
+           "0: none");
   darkness("occlusion", "##occlusion", state.ambient_occlusion, "darkens what the volume surrounds; 0: none");
 }
 

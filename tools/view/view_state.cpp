@@ -296,6 +296,11 @@ std::vector<ClipPlane> visiblePlanes(const std::vector<ListedPlane>& planes) {
   return visible;
 }
 
+std::optional<glm::dvec3> ViewState::lightFrom() const {
+  if (light_direction || shadow == 0) return light_direction;
+  return Light::kShadowsFrom;
+}
+
 FrameOptions ViewState::frameOptions(ImageSize size) const {
   FrameOptions options;
   options.size = size;
@@ -308,7 +313,11 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     Light& light = options.light.emplace();
     light.shadow = static_cast<float>(shadow);
     light.ambient_occlusion = static_cast<float>(ambient_occlusion);
-    if (shadow > 0) light.towards = Light::kShadowsFrom;
+    light.towards = lightFrom();
+    if (light_strength != kLightStrength) {
+      light.diffuse = static_cast<float>(light_strength);
+      light.ambient = 1 - light.diffuse;
+    }
   }
   options.gradient_opacity = gradient_opacity;
   if (hasSheets()) {
@@ -408,6 +417,9 @@ std::string toJson(const ViewState& state) {
   json["lit"] = state.lit;
   json["shadow"] = state.shadow;
   json["ambient_occlusion"] = state.ambient_occlusion;
+  json["light_strength"] = state.light_strength;
+  json["light_direction"] = nullptr;
+  if (state.light_direction) json["light_direction"] = jsonOf(*state.light_direction);
   json["gradient_opacity"] = textOf(state.gradient_opacity);
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
@@ -447,6 +459,11 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   if (const auto shadow = fields.find("shadow")) state.shadow = shadow->number(0, 1);
   if (const auto occlusion = fields.find("ambient_occlusion"))
     state.ambient_occlusion = occlusion->number(0, 1);
+  if (const auto strength = fields.find("light_strength")) state.light_strength = strength->number(0, 1);
+  if (const auto direction = fields.find("light_direction")) {
+    state.light_direction = direction->point();
+    if (!(glm::length(*state.light_direction) > 0)) direction->fail("a direction");
+  }
   if (const auto gradient = fields.find("gradient_opacity"); gradient && !gradient->text().empty())
     state.gradient_opacity = opacitiesFrom(*gradient);
   state.dark = fields.at("dark").flag();

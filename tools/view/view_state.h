@@ -75,6 +75,8 @@ struct OpacityScalar {
 };
 
 struct ViewState {
+  static constexpr double kLightStrength = 0.7;
+
   std::string variable;
   Camera camera;
   EditedFunction function;
@@ -93,9 +95,11 @@ struct ViewState {
   SheetOpacity iso_opacity = {};
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
-  double shadow = 0, ambient_occlusion = 0;         // Light's, where lit
-  std::vector<OpacityPoint> gradient_opacity = {};  // FrameOptions'
-  bool dark = true;                                 // background
+  double shadow = 0, ambient_occlusion = 0;  // Light's, where lit
+  double light_strength = kLightStrength;    // the light's part of what one sees; the rest is ambient
+  std::optional<glm::dvec3> light_direction = std::nullopt;  // towards the light; none: as Light's
+  std::vector<OpacityPoint> gradient_opacity = {};           // FrameOptions'
+  bool dark = true;                                          // background
   Annotations annotations{.scalar_bar = true, .axes = true};
   std::optional<OpacityScalar> opacity_by = std::nullopt;
   std::vector<Marker> markers = {};
@@ -115,6 +119,8 @@ struct ViewState {
   bool hasSheets() const;
   /// Whether the volume is drawn: always if there is nothing else, whatever `volume` says.
   bool drawsVolume() const { return volume || !hasSheets(); }
+  /// The direction towards the light, where lit; nullopt: the viewer. Shadows need a direction.
+  std::optional<glm::dvec3> lightFrom() const;
   /// The opacity of faces as they are drawn: without a scalar there is no function.
   SheetOpacity opacityOf(const NamedFaces& named) const;
   FaceNames faceNames() const;
