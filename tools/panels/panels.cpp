@@ -246,7 +246,8 @@ void drawLight(ViewState& state, PanelActions& actions) {
     nameWidget(name);
     return slides;
   };
-  slide("light strength", state.light_strength, 0, 1, "%.2f");
+  if (slide("light strength", state.light_strength, 0, 1, "%.2f"))
+    state.light_strength = std::round(100 * state.light_strength) / 100;
   hint("the rest is the same everywhere");
   bool at_viewer = !state.lightFrom();
   ImGui::BeginDisabled(!state.light_direction && state.shadow > 0);  // which needs a direction

@@ -319,10 +319,9 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
     words.add("--scale", fmt::format("{},{},{}", state.scale.x, state.scale.y, state.scale.z));
   if (!of_film) addCuts(state, words);
   if (state.lit) words.add("--shade");
-  if (state.lit && state.light_strength != ViewState::kLightStrength) {
-    const Light light = *state.frameOptions({1, 1}).light;
-    words.add("--light", fmt::format("{},{},{}", light.ambient, light.diffuse, light.specular));
-  }
+  if (state.lit && state.light_strength != ViewState::kLightStrength)
+    words.add("--light", fmt::format("{},{},{}", number(1 - state.light_strength),
+                                     number(state.light_strength), Light{}.specular));
   if (state.lit && state.light_direction) words.add("--light-direction", numbers(*state.light_direction, 1));
   if (state.lit && state.shadow > 0) words.add("--shadow", number(state.shadow));
   if (state.lit && state.ambient_occlusion > 0)

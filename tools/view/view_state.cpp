@@ -316,7 +316,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     light.towards = lightFrom();
     if (light_strength != kLightStrength) {
       light.diffuse = static_cast<float>(light_strength);
-      light.ambient = 1 - light.diffuse;
+      light.ambient = static_cast<float>(1 - light_strength);
     }
   }
   options.gradient_opacity = gradient_opacity;
