@@ -42,6 +42,7 @@ struct AnnotatedScene {
   glm::dvec3 lower{0.0}, upper{0.0};  // the box around the data, before --scale
   glm::vec4 background{1, 1, 1, 1};   // text and lines are black if it is light, else white
   std::array<std::string, 3> axis_titles{"x", "y", "z"};  // of the axes grid
+  double text_size = 0;                                   // as in Annotations
   std::string title = {}, label = {};                     // above the data, and in its upper left corner
 
   /// A box of longitude, latitude (degrees) and height (kilometres).

@@ -31,7 +31,7 @@ void drawOutline(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& 
                                     n & 2 ? scene.upper.y : scene.lower.y,
                                     n & 4 ? scene.upper.z : scene.lower.z});
   };
-  cairo_set_line_width(cairo, std::max(1.0, fontSize(scene.view.size) / 12));
+  cairo_set_line_width(cairo, std::max(1.0, fontSize(scene.view.size, scene.text_size) / 12));
   setInk(cairo, ink, 0.7);
   for (int from = 0; from < 8; ++from)
     for (const int axis : {1, 2, 4}) {
@@ -63,8 +63,9 @@ void drawArrow(cairo_t* cairo, const glm::dvec2& from, const glm::dvec2& to, dou
   cairo_fill(cairo);
 }
 
-void drawAxes(cairo_t* cairo, const ScreenView& view, const glm::dvec3& ink) {
-  const double font = fontSize(view.size), length = 3 * font;
+void drawAxes(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+  const ScreenView& view = scene.view;
+  const double font = fontSize(view.size, scene.text_size), length = 3 * font;
   const glm::dvec2 origin(length + 2 * font, view.size.height - length - 2 * font);
   struct Axis {
     glm::dvec3 in_view;  // right, down, forward
@@ -116,8 +117,7 @@ double opacityOf(const TransferFunction& function, const TransferFunction::Value
   return -std::expm1(-value.extinction * function.opacityUnit());
 }
 
-ScalarBar layOut(cairo_t* cairo, ImageSize picture, const ShownFunction& shown) {
-  const double font = fontSize(picture);
+ScalarBar layOut(cairo_t* cairo, ImageSize picture, double font, const ShownFunction& shown) {
   ScalarBar bar;
   bar.height = std::floor(0.6 * picture.height);
   bar.top = std::floor((picture.height - bar.height) / 2);
@@ -144,12 +144,11 @@ glm::dvec3 colourOf(const ShownFunction& shown, double scalar, const glm::dvec3&
 }
 
 /// `right`: where the strip ends.
-void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, double right,
+void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, double font, double right,
              const glm::dvec3& ink) {
   const ScalarAxis axis = shown.function->axis();
   const bool is_one_value = !(axis.range.first < axis.range.second);
-  const double font = fontSize(picture);
-  const ScalarBar bar = layOut(cairo, picture, shown);
+  const ScalarBar bar = layOut(cairo, picture, font, shown);
   const double left = std::floor(right - bar.width + leftOf(shown, font));
   const double width = std::floor(kBarWidth * font);
   for (double y = 0; y < bar.height; ++y) {
@@ -192,18 +191,20 @@ void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, doub
 }
 
 /// The strip's width in whole pixels; at most half of the picture.
-double scalarBarsWidth(cairo_t* cairo, ImageSize picture, std::span<const ShownFunction> functions) {
+double scalarBarsWidth(cairo_t* cairo, ImageSize picture, double font,
+                       std::span<const ShownFunction> functions) {
   double width = 0;
-  for (const ShownFunction& shown : functions) width += layOut(cairo, picture, shown).width;
+  for (const ShownFunction& shown : functions) width += layOut(cairo, picture, font, shown).width;
   return std::floor(std::min(width, picture.width / 2.0));
 }
 
-void drawScalarBars(cairo_t* cairo, ImageSize picture, std::span<const ShownFunction> functions,
-                    const glm::dvec3& ink) {
-  double right = picture.width - scalarBarsWidth(cairo, picture, functions);
-  for (const ShownFunction& shown : functions) {
-    right = std::min(right + layOut(cairo, picture, shown).width, double(picture.width));
-    drawBar(cairo, shown, picture, right, ink);
+void drawScalarBars(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+  const ImageSize picture = scene.picture;
+  const double font = fontSize(picture, scene.text_size);
+  double right = picture.width - scalarBarsWidth(cairo, picture, font, scene.functions);
+  for (const ShownFunction& shown : scene.functions) {
+    right = std::min(right + layOut(cairo, picture, font, shown).width, double(picture.width));
+    drawBar(cairo, shown, picture, font, right, ink);
   }
 }
 
@@ -211,7 +212,8 @@ void drawScalarBars(cairo_t* cairo, ImageSize picture, std::span<const ShownFunc
 
 void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
   constexpr double kTitle = 1.4;  // of the font's size
-  const double font = fontSize(scene.picture), width = scene.view.size.width, room = width - 2 * font;
+  const double font = fontSize(scene.picture, scene.text_size), width = scene.view.size.width,
+               room = width - 2 * font;
   double top = 0.5 * font;
   cairo_save(cairo);
   if (!scene.title.empty()) {
@@ -235,7 +237,7 @@ void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& in
 Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool lines) {
   Canvas canvas(scene.picture);
   cairo_t* const cairo = canvas.get();
-  cairo_set_font_size(cairo, fontSize(scene.picture));
+  cairo_set_font_size(cairo, fontSize(scene.picture, scene.text_size));
   const glm::dvec3 ink = inkFor(scene.background);
   cairo_save(cairo);  // clips axes and outline to the part that shows the data
   cairo_rectangle(cairo, 0, 0, scene.view.size.width, scene.view.size.height);
@@ -243,10 +245,10 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool l
   if (annotations.outline) drawOutline(cairo, scene, ink);
   if (annotations.axes_grid && lines) drawAxesGrid(cairo, scene, ink);
   if (annotations.axes_grid) drawAxesLabels(cairo, scene, ink);
-  if (annotations.axes) drawAxes(cairo, scene.view, ink);
+  if (annotations.axes) drawAxes(cairo, scene, ink);
   if (annotations.texts) drawTexts(cairo, scene, ink);
   cairo_restore(cairo);
-  if (annotations.scalar_bar) drawScalarBars(cairo, scene.picture, scene.functions, ink);
+  if (annotations.scalar_bar) drawScalarBars(cairo, scene, ink);
   return canvas;
 }
 
@@ -297,8 +299,10 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture,
                    std::span<const ShownFunction> functions) {
   if (!annotations.scalar_bar) return picture;
   const Canvas ruler({1, 1});
-  cairo_set_font_size(ruler.get(), fontSize(picture));
-  return {picture.width - static_cast<int>(scalarBarsWidth(ruler.get(), picture, functions)), picture.height};
+  const double font = fontSize(picture, annotations.text_size);
+  cairo_set_font_size(ruler.get(), font);
+  return {picture.width - static_cast<int>(scalarBarsWidth(ruler.get(), picture, font, functions)),
+          picture.height};
 }
 
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function) {

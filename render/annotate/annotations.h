@@ -24,6 +24,7 @@ struct Annotations {
   bool outline = false;
   bool axes_grid = false;  // its lines lie behind the data if that is over a transparent background
   bool texts = false;      // the scene's title and label
+  double text_size = 0;    // of the font, in pixels; 0: by the picture's height
   bool operator==(const Annotations&) const = default;
 };
 
@@ -36,7 +37,7 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture,
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function);
 
 /// The whole picture: `data`, which has the size of scene.view, over the background where it is transparent,
-/// and the annotations. The text's size follows the picture's height. Takes the memory of `data` if it is as
+/// and the annotations. Without a text size it follows the picture's height. Takes the memory of `data` if it is as
 /// large as the picture, and frees it otherwise. Throws Error if the picture is larger than Cairo supports
 /// (32,767 pixels a side).
 Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& scene);

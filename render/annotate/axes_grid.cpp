@@ -41,7 +41,8 @@ class Box {
         if (const auto line = lineOf(edge(axis, n & 1, n & 2)))
           longest = std::max(longest, glm::distance(line->first, line->second));
       const double low = scene.lower[axis], high = scene.upper[axis];
-      const int wanted = static_cast<int>(longest / (kLabelSpace * fontSize(scene.view.size)));
+      const int wanted =
+          static_cast<int>(longest / (kLabelSpace * fontSize(scene.view.size, scene.text_size)));
       if (std::isfinite(low) && std::isfinite(high) && low < high)
         ticks_[axis] = axisTicks({{low, high}}, std::clamp(wanted, kMinTicks, kMaxTicks));
     }
@@ -149,7 +150,7 @@ void drawLabels(cairo_t* cairo, const AnnotatedScene& scene, const Box& box, int
 
 void drawEdgeLabels(cairo_t* cairo, const AnnotatedScene& scene, const LabelledEdge& edge,
                     const glm::dvec2& centre) {
-  const double font = fontSize(scene.view.size);
+  const double font = fontSize(scene.view.size, scene.text_size);
   if (!(glm::distance(edge.from, edge.to) > edge.shortest * font)) return;
   const glm::dvec2 along = glm::normalize(edge.to - edge.from);
   glm::dvec2 outward(-along.y, along.x);
@@ -198,7 +199,7 @@ void drawEdgeLabels(cairo_t* cairo, const AnnotatedScene& scene, const LabelledE
 void drawAxesGrid(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
   if (scene.on_globe) return drawGlobeGrid(cairo, scene, ink);
   const Box box(scene);
-  cairo_set_line_width(cairo, std::max(1.0, fontSize(scene.view.size) / 14));
+  cairo_set_line_width(cairo, std::max(1.0, fontSize(scene.view.size, scene.text_size) / 14));
   for (int axis = 0; axis < 3; ++axis)
     for (const bool upper : {false, true}) {
       if (box.seen(axis, upper) >= 0) continue;

@@ -59,7 +59,7 @@ class GlobeBox {
       : scene_(scene),
         box_(*scene.on_globe),
         around_(box_.globe.sphere() && box_.upper.x - box_.lower.x > kAround) {
-    const double font = fontSize(scene.view.size);
+    const double font = fontSize(scene.view.size, scene.text_size);
     for (int axis = 0; axis < 3; ++axis) {
       double longest = 0;
       for (int n = 0; n < 4; ++n) longest = std::max(longest, lengthOf(edge(axis, n & 1, n & 2)));
@@ -210,7 +210,7 @@ class GlobeBox {
 
 void drawGlobeGrid(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
   const GlobeBox box(scene);
-  cairo_set_line_width(cairo, std::max(1.0, fontSize(scene.view.size) / 14));
+  cairo_set_line_width(cairo, std::max(1.0, fontSize(scene.view.size, scene.text_size) / 14));
   for (int axis = 0; axis < 3; ++axis)
     for (const bool upper : {false, true}) {
       if (!box.has(axis, upper)) continue;
@@ -245,7 +245,7 @@ namespace {
 /// Coordinates on the Earth's side that is seen: of meridians at one latitude, of circles of latitude at one longitude.
 void drawLabelsOnEarth(cairo_t* cairo, const AnnotatedScene& scene, const GlobeBox& box,
                        const glm::dvec3& ink) {
-  const double font = fontSize(scene.view.size);
+  const double font = fontSize(scene.view.size, scene.text_size);
   const glm::dvec2 below = box.belowViewer();
   for (const int axis : {0, 1}) {
     const int other = 1 - axis;

@@ -120,6 +120,31 @@ TEST_F(Annotations, EachFunctionHasABarWithATitleOfItsOwn) {
   expectSays(wrong.err, "--scalar-bar-title: given 2 times; the picture shows 1 function");
 }
 
+/// The font is the one that follows the height, 9 pixels in a small picture, or as it is asked for.
+TEST_F(Annotations, TextHasTheSizeThatIsAskedFor) {
+  const Image usual = render({"--scalar-bar"}), same = render({"--scalar-bar", "--text-size", "9"});
+  EXPECT_EQ(changed(usual, same, 0, 200, 0, 160), 0);
+  // The bar's colours are twice as wide.
+  const auto barWidth = [](const Image& picture) {
+    const auto isColour = [&](int x) {
+      const float* const pixel = picture.pixel(x, 80);
+      return std::abs(pixel[0] - pixel[2]) > 0.1f || std::abs(pixel[0] - pixel[1]) > 0.1f;
+    };
+    int first = picture.size.width - 1;
+    while (first > 0 && !isColour(first)) --first;
+    int width = 0;
+    while (first >= 0 && isColour(first)) --first, ++width;
+    return width;
+  };
+  const Image large = render({"--scalar-bar", "--text-size", "18"});
+  EXPECT_NEAR(barWidth(usual), 1.3 * 9, 1);
+  EXPECT_NEAR(barWidth(large), 1.3 * 18, 1);
+  const ProgramResult wrong =
+      runProgram({"render", file("a.splats"), "-o", file("b.png"), "--axes", "--text-size", "2"});
+  EXPECT_EQ(wrong.status, 2);
+  expectSays(wrong.err, "--text-size 2: expected pixels from 4 to 1000");
+}
+
 TEST_F(Annotations, TextsSayWhatIsShown) {
   const auto onWhite = [](const Words& options) { return render(Words{"--background", "white"} + options); };
   const Image plain = onWhite({});

@@ -39,7 +39,7 @@ EDGES = {  # values at the edges of what an option takes, by its name
     "--scale": VECTORS, "--position": VECTORS, "--focal-point": VECTORS, "--view-up": VECTORS, "--light-direction": VECTORS, "--clip-plane": PLANES,
     "--slice": PLANES, "--clip-box": ["1,0,0,1,0,1", "0,0,0,0,0,0", "nan,1,0,1,0,1", "-1e308,1e308,-1e308,1e308,-1e308,1e308", "0,1,0,1"],
     "--light": ["0.3,0.7,0.25", "2,0,0", "-1,0,0", "nan,0,0", "1,1"], "--look-at": ["0,0", "nan,0", "0,91", "1e308,0", "180,-90", "0"],
-    "--shadow": NUMBERS, "--ambient-occlusion": NUMBERS, "--from-height": NUMBERS, "--lines-time": ["past", "all", "-1", "nan", "1e308", "1e308 days"],
+    "--shadow": NUMBERS, "--text-size": NUMBERS, "--ambient-occlusion": NUMBERS, "--from-height": NUMBERS, "--lines-time": ["past", "all", "-1", "nan", "1e308", "1e308 days"],
     "--globe": ["off", "1", "nan", "-1", "1e308"], "--background": COLOURS, "--surface-colour": COLOURS, "--lines-colour": COLOURS,
     "--surface-opacity": OPACITIES, "--slice-opacity": OPACITIES, "--iso-opacity": OPACITIES, "--lines-opacity": OPACITIES, "--title": TITLES, "--label": TITLES,
     "--iso": ["0.5", "0,1,2", "nan", "1e308", ",".join(str(n / 1000) for n in range(1000)), ",", "0.5,", "-1e-320"], "--surface": FACES,

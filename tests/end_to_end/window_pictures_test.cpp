@@ -58,7 +58,10 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   ASSERT_EQ(commands.size(), 1u);
   Words command = commands[0];
   for (size_t n = 0; n + 1 < command.size(); ++n)
-    if (command[n] == "--size") command[n + 1] = fmt::format("{}x{}", twice.size.width, twice.size.height);
+    if (command[n] == "--size")
+      command[n + 1] = fmt::format("{}x{}", twice.size.width, twice.size.height);
+    else if (command[n] == "--text-size")
+      command[n + 1] = fmt::format("{}", 2 * std::stod(command[n + 1]));
   expectDraws(command, twice);
 }
 

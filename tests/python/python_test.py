@@ -145,6 +145,7 @@ class Pictures(PythonTest):
                 self.skipTest(str(error))  # built without annotations
             self.assertEqual(picture.shape, (120, 160, 4))
             self.expect_same(picture, "--scalar-bar", "--axes", "--outline")
+            self.expect_same(cache.render(size=(160, 120), scalar_bar=True, text_size=14), "--scalar-bar", "--text-size", 14)
             self.expect_same(cache.render(size=(160, 120), scalar_bar_titles="speed", axes_titles=("x [m]", "y [m]", "z [m]")),
                              "--scalar-bar-title", "speed", "--axes-titles", "x [m],y [m],z [m]")
             self.expect_same(cache.render(size=(160, 120), axes_grid=True, background="black"), "--axes-grid", "--background", "black")

@@ -350,6 +350,10 @@ void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, con
       .add_option("--label", arguments.label,
                   "Text in the upper left corner, with the same fields: \"t = {time:.2f} s\", \"{scalar}\"")
       ->group(group);
+  command
+      .add_option("--text-size", arguments.text_size,
+                  "Size of the font of all these, in pixels (default: 1/42 of the picture's height)")
+      ->group(group);
 }
 
 void checkAnnotationArguments(const AnnotationArguments& arguments) {
@@ -358,7 +362,19 @@ void checkAnnotationArguments(const AnnotationArguments& arguments) {
   arguments.fill({}, scene);
 }
 
+void AnnotationArguments::showTitles() {
+  constexpr double kMin = 4, kMax = 1000;
+  shown.scalar_bar |= !bar_titles.empty();
+  shown.axes_grid |= axis_titles.has_value();
+  shown.texts = title || label;
+  if (!text_size) return;
+  shown.text_size = parsePositive("--text-size", *text_size);
+  if (!(shown.text_size >= kMin && shown.text_size <= kMax))
+    throw UsageError("--text-size {}: expected pixels from {:g} to {:g}", *text_size, kMin, kMax);
+}
+
 void AnnotationArguments::fill(const TextFields& fields, AnnotatedScene& scene) const {
+  scene.text_size = shown.text_size;
   if (title) scene.title = filledText("--title", *title, fields);
   if (label) scene.label = filledText("--label", *label, fields);
 }

@@ -94,21 +94,17 @@ std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const
 struct AnnotationArguments {
   Annotations shown;
   std::vector<std::string> bar_titles;
-  std::optional<std::string> axis_titles, title, label;
+  std::optional<std::string> axis_titles, title, label, text_size;
 
-  /// Shows what the titles need.
-  void showTitles() {
-    shown.scalar_bar |= !bar_titles.empty();
-    shown.axes_grid |= axis_titles.has_value();
-    shown.texts = title || label;
-  }
+  /// Shows what the titles need, in text of the size that is given.
+  void showTitles();
   /// Gives the axes grid the longitudes, latitudes and heights of `box`, if it is given, and their titles.
   void put(const std::optional<AnnotatedScene::OnGlobe>& box, AnnotatedScene& scene) const;
   /// The scene's texts, with their fields filled in.
   void fill(const TextFields& fields, AnnotatedScene& scene) const;
 };
 
-/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles, --outline, --title and --label under the
+/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles, --outline, --title, --label and --text-size under the
 /// heading `group`.
 void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group);
 

@@ -105,6 +105,7 @@ AnnotationArguments annotationArguments(const Options& frame, const py::dict& ot
   arguments.axis_titles = given(frame, "axes_titles");
   arguments.title = given(frame, "title");
   arguments.label = given(frame, "label");
+  arguments.text_size = given(frame, "text_size");
   arguments.shown.scalar_bar = of<bool>(others, "scalar_bar");
   arguments.shown.axes = of<bool>(others, "axes");
   arguments.shown.axes_grid = of<bool>(others, "axes_grid");

@@ -59,7 +59,10 @@ ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize
 
 AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
                        ImageSize picture) {
-  return {picture, frame.view, functions.bars(), frame.data.lower, frame.data.upper, state.background()};
+  AnnotatedScene scene{picture,          frame.view,       functions.bars(),
+                       frame.data.lower, frame.data.upper, state.background()};
+  scene.text_size = state.annotations.text_size;
+  return scene;
 }
 
 std::optional<glm::dvec3> pointSeenAt(const ShownValues& shown, const Manifest& manifest,

@@ -333,6 +333,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   if (state.annotations.axes) words.add("--axes");
   if (state.annotations.axes_grid) words.add("--axes-grid");
   if (state.annotations.outline) words.add("--outline");
+  if (state.annotations.text_size > 0) words.add("--text-size", number(state.annotations.text_size));
   return words.text();
 }
 

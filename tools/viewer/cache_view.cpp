@@ -145,6 +145,7 @@ void CacheView::draw(const WindowLayout& layout) {
   reports_.attempt([&] { takeSurface(); });
   reports_.attempt([&] { takeIsosurfaces(); });
   reports_.attempt([&] { drawFilmPictures(); });
+  changed_ |= state_.annotations.text_size != textSize();
   const ImageSize size = pixelsOf(layout.picture, window_);
   const bool resized = size.width > 0 && !same(size, picture_size_);
   if (resized) fitTo(size);  // before the mouse's movements, which are in its pixels
@@ -181,8 +182,14 @@ double CacheView::zoomForBars() const {
   return fitted_width_ > 0 ? std::min(1.0, data_size_.width / fitted_width_) : 1;
 }
 
+/// That of the panels, in pixels.
+double CacheView::textSize() const {
+  return std::round(window_.pixelScale() * window_.fontSize());
+}
+
 /// The state's camera is one for the bars that it has.
 void CacheView::takeBars() {
+  state_.annotations.text_size = textSize();
   data_size_ = dataSizeOf(state_, manifest(), picture_size_);
 }
 

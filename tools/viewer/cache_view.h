@@ -148,6 +148,7 @@ class CacheView {
   void fitTo(ImageSize size);
   double zoomForBars() const;
   void takeBars();
+  double textSize() const;
   void react(const WindowLayout& layout);
   PanelActions drawPanels(const WindowLayout& layout);
   void apply(const PanelActions& actions);

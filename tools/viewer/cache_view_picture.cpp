@@ -238,7 +238,9 @@ void CacheView::saveMovieTo(const fs::path& file, ImageSize size, std::optional<
   if (movie_kind_ == MovieKind::kFilm && !film_.film()) return;  // its key frames were removed meanwhile
   MovieRequest movie = newMovie(file, frames_per_s);
   const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
-  const ImageSize data = dataSizeOf(state_, manifest(), size);
+  // Text takes the same part of the picture.
+  movie.state.annotations.text_size *= static_cast<double>(size.height) / picture_size_.height;
+  const ImageSize data = dataSizeOf(movie.state, manifest(), size);
   movie.size = size;
   movie.state.camera = holding(movie.state.camera, data_size_, data);
   movie.magnification = std::min(1.0, aspect(data) / aspect(data_size_));

@@ -120,6 +120,8 @@ class Window {
 
   /// Height of a line of text, without the space between lines, in Dear ImGui units.
   float textHeight() const { return text_height_; }
+  /// Size of the same font, as Cairo counts it: text is higher than its letters are large.
+  double fontSize() const { return static_cast<double>(text_height_) / kTextHeight; }
   /// Height of a menu bar: a line with the space that a widget has around it.
   double lineHeight() const { return line_height_; }
   void setTitle(const std::string& title);
@@ -133,6 +135,8 @@ class Window {
   const std::string& contextName() const { return context_name_; }
 
  private:
+  static constexpr double kTextHeight = 1.164;  // of DejaVu Sans, ascent and descent, in its size
+
   static void onKey(GLFWwindow* window, int key, int scancode, int action, int mods);
   static void onButton(GLFWwindow* window, int button, int action, int mods);
   static void onMove(GLFWwindow* window, double x, double y);

@@ -350,7 +350,7 @@ class Cache:
                gradient_opacity: Union[str, Sequence[Tuple[float, float]], None] = None, background: str = "dark", scalar_bar: bool = False,
                scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
                axes_titles: Optional[Sequence[str]] = None, outline: bool = False, title: Optional[str] = None,
-               label: Optional[str] = None, lines: Union[str, Sequence[str]] = (), points: Union[str, Sequence[str]] = (),
+               label: Optional[str] = None, text_size: Optional[float] = None, lines: Union[str, Sequence[str]] = (), points: Union[str, Sequence[str]] = (),
                lines_by: str = "", lines_colour: Union[str, Sequence[str]] = (), line_width: Union[str, float] = "3px",
                point_size: Union[str, float] = "6px", lines_opacity: float = 1, lines_time: Union[str, float, None] = None,
                globe: Optional[Sequence[float]] = None, look_at: Optional[Tuple[float, float]] = None, from_height: Optional[float] = None,
@@ -405,7 +405,7 @@ class Cache:
         ambient_occlusion (0..1: how dark it is where the volume keeps light out) turn it on, too. gradient_opacity: points (share of the volume that is less steep 0..1, factor of the opacity 0..1).
 
         scalar_bar, scalar_bar_titles, axes, axes_grid, axes_titles (of x, y and z) and outline are drawn into the
-        picture, and title and label, texts with the fields {time}, {step}, {frame}, {scalar} and {units}. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
+        picture, and title and label, texts with the fields {time}, {step}, {frame}, {scalar} and {units}, in a font of text_size pixels. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
 
         lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws
         the best that has no more. memory: the limit, in bytes or as "512M"; card_memory: of a
@@ -431,7 +431,8 @@ class Cache:
                        max_splats=None if max_splats is None else str(max_splats),
                        channels=",".join(_arguments.several(channels)) or "none",
                        lines_time=None if lines_time is None else _text(lines_time), globe=globe,
-                       axes_titles=None if axes_titles is None else ",".join(axes_titles), title=title, label=label)
+                       axes_titles=None if axes_titles is None else ",".join(axes_titles), title=title, label=label,
+                       text_size=None if text_size is None else _text(text_size))
         others = {"clip_planes": _arguments.planes("clip_planes", clip_planes, _numbers),
                   "step": None if step is None else _arguments.whole("step", step),
                   "interpolate": _arguments.flag("interpolate", interpolate),
