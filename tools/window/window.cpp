@@ -15,6 +15,7 @@
 
 #include "render/gl/gl_context.h"
 #include "stream/base/error.h"
+#include "tools/window/theme.h"
 #include "tools/window/widgets.h"
 
 namespace curvisplat {
@@ -136,13 +137,10 @@ void Window::applyLook() {
   const double units = std::max(0.5, content_scale_ / pixelScale() * text_scale_);
   text_height_ = static_cast<float>(std::lround(kTextPixels * units));
   ImGuiStyle style;
-  light_ ? ImGui::StyleColorsLight(&style) : ImGui::StyleColorsDark(&style);
+  setTheme(style, light_);
   style.WindowRounding = style.FrameRounding = style.PopupRounding = style.GrabRounding = 3;
   style.WindowBorderSize = 0;
   if (light_) style.FrameBorderSize = 1;
-  // Dear ImGui's own grey has a contrast of 2.5 : 1 on light panels.
-  style.Colors[ImGuiCol_TextDisabled] = light_ ? ImVec4(0.4f, 0.4f, 0.4f, 1) : ImVec4(0.6f, 0.6f, 0.6f, 1);
-  style.Colors[ImGuiCol_PopupBg].w = style.Colors[ImGuiCol_WindowBg].w = 1;
   style.ScaleAllSizes(static_cast<float>(units));
   ImGui::GetStyle() = style;
   line_height_ = static_cast<double>(text_height_ + 2 * style.FramePadding.y);
