@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <ostream>
 #include <sstream>
@@ -174,6 +177,33 @@ TEST_F(DefaultPictures, RangesByPercentilesAndOfAllData) {
     EXPECT_EQ(result.status, 2) << wrong << result.err;
     expectSays(result.err, "--range");
   }
+}
+
+/// Values from -0.42 to 0.58: the middle colour of a diverging map is that of zero, whether the map is chosen or named.
+TEST_F(DefaultPictures, DivergingMapsAreCentred) {
+  constexpr int kSide = 14;
+  std::ofstream grid(file("signed.xyz")), values(file("signed.fun"));
+  grid << fmt::format("{0} {0} {0}\n", kSide);
+  values << fmt::format("{0} {0} {0} 1\n", kSide);
+  for (int axis = 0; axis < 3; ++axis)
+    for (int n = 0; n < kSide * kSide * kSide; ++n)
+      grid << (axis == 0 ? n : axis == 1 ? n / kSide : n / kSide / kSide) % kSide / (kSide - 1.0) << '\n';
+  for (int n = 0; n < kSide * kSide * kSide; ++n) values << n % kSide / (kSide - 1.0) - 0.42 << '\n';
+  grid.close();
+  values.close();
+  run({"convert", file("signed.xyz"), file("signed.fun"), "-o", file("a.splats"), "--overwrite"});
+  const auto middleOf = [&](const Words& options) {
+    const Words chosen = chosenOptions(render(options).out);
+    for (const std::string& word : chosen) {
+      double low = 0, high = 0;
+      if (std::sscanf(word.c_str(), "--range=%lf,%lf", &low, &high) == 2) return (low + high) / (high - low);
+    }
+    ADD_FAILURE() << testing::PrintToString(chosen);
+    return 1.0;
+  };
+  EXPECT_NEAR(middleOf({}), 0, 1e-9);
+  EXPECT_NEAR(middleOf({"--tf", "cool-warm"}), 0, 1e-9);
+  EXPECT_GT(std::abs(middleOf({"--tf", "viridis"})), 0.05);
 }
 
 TEST_F(DefaultPictures, AConstantScalarIsNotChosen) {
