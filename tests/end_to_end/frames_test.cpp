@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -92,6 +93,29 @@ TEST_F(Frames, AnOrbitBeginsAtTheCameraThatWasGiven) {
   const auto focal_point = json("p.json")["frames"][1]["camera"]["focal_point"];
   EXPECT_NEAR(position[0].get<double>(), focal_point[0].get<double>(), 1e-9);
   EXPECT_GT(position[1].get<double>(), focal_point[1].get<double>() + 1);
+}
+
+/// In perspective, from the side that a picture without options has, and further away: all of the data is in every picture.
+TEST_F(Frames, AnOrbitBeginsAtTheChosenView) {
+  expectDrawn({"-o", file("chosen.png"), "--stats", file("chosen.json")});
+  expectDrawn({"-o", file("c%d.png"), "--orbit", "360", "--frames", "7", "--stats", file("c.json")});
+  const auto direction = [&](const nlohmann::json& frame) {
+    std::array<double, 4> towards{};
+    for (size_t axis = 0; axis < 3; ++axis)
+      towards[axis] = frame["camera"]["position"][axis].get<double>() -
+                      frame["camera"]["focal_point"][axis].get<double>();
+    towards[3] = std::hypot(towards[0], towards[1], towards[2]);
+    return towards;
+  };
+  const nlohmann::json still = json("chosen.json")["frames"][0], frames = json("c.json")["frames"];
+  const auto one = direction(still), first = direction(frames[0]);
+  for (size_t axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(first[axis] / first[3], one[axis] / one[3], 0.1) << axis;
+  EXPECT_EQ(frames[0]["camera"]["view_angle_deg"], still["camera"]["view_angle_deg"]);
+  for (const auto& frame : frames) {
+    EXPECT_EQ(frame["splats_off_screen"], 0);
+    EXPECT_NEAR(direction(frame)[3], first[3], 1e-9);
+  }
 }
 
 TEST_F(Frames, AnOrbitKeepsAllOfTheDataInEveryPicture) {

@@ -39,9 +39,10 @@ struct CameraArguments {
   std::filesystem::path path;
   std::shared_ptr<const Film> film = nullptr;  // of `path`, where it has been read already
 
-  /// Whether they place the camera, rather than change the place that is chosen from the data.
+  /// Whether they place the camera, rather than change the place that is chosen from the data. An orbit begins there.
   bool place() const {
-    return view || position || focal_point || view_up || parallel_scale || view_angle || look_at || moves();
+    return view || position || focal_point || view_up || parallel_scale || view_angle || look_at ||
+           !path.empty();
   }
   bool turn() const { return azimuth || elevation || roll; }
   bool moves() const { return orbit || !path.empty(); }

@@ -4,12 +4,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <glm/geometric.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "render/automatic/first_choice.h"
 #include "render/camera/camera.h"
+#include "render/camera/camera_path.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 #include "stream/cache/value_histogram.h"
@@ -259,12 +262,29 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
   return withUnit(definition, nullptr, arguments);
 }
 
+namespace {
+
+/// The place behind that of the camera from which the box is seen whole at all angles of an orbit.
+glm::dvec3 placeForOrbit(const Camera& camera, double degrees, const PictureChoice::Framing& framing) {
+  double distance = 0;
+  for (unsigned n = 0; n < kDefaultFrames; ++n) {
+    Camera turned = orbited(camera, degrees * n / kDefaultFrames);
+    turned.fit(framing.box.lower, framing.box.upper, framing.size);
+    distance = std::max(distance, glm::distance(turned.position, turned.focal_point));
+  }
+  return camera.focal_point + distance * glm::normalize(camera.position - camera.focal_point);
+}
+
+}  // namespace
+
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
                                       const Framing& framing) {
   if (arguments.place()) return arguments;
   const auto& [box, size, whole] = framing;
+  const bool orbits = arguments.orbit.has_value();
   const ViewChoice choice =
-      data().view(function, size, whole ? Framed::kBox : Framed::kSeen, box.lower, box.upper);
+      data().view(function, size, whole || orbits ? Framed::kBox : Framed::kSeen, box.lower, box.upper);
+  if (orbits && !choice.position) return arguments;  // around a side of thin data, it would be seen edge-on
   const auto exactPoint = [](const glm::dvec3& point) {
     return fmt::format("{},{},{}", point.x, point.y, point.z);
   };
@@ -272,7 +292,8 @@ CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferF
     argument = value;
     add(option, value);
   };
-  const Camera camera = cameraOf(choice, box.lower, box.upper, size);
+  Camera camera = cameraOf(choice, box.lower, box.upper, size);
+  if (orbits) camera.position = placeForOrbit(camera, parseNumber("--orbit", *arguments.orbit), framing);
   say("--position", arguments.position, exactPoint(camera.position));
   if (camera.view_up != glm::dvec3(0, 0, 1)) say("--view-up", arguments.view_up, exactPoint(camera.view_up));
   if (choice.focal_point) say("--focal-point", arguments.focal_point, exactPoint(*choice.focal_point));
