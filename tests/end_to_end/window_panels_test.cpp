@@ -34,7 +34,7 @@ class WindowPanels : public WindowTest {
     tab("Objects");
     click("Markers");
   }
-  /// From the viewer to the focal point of a command.
+  /// Returns how far the viewer is from the focal point of a command.
   static double distanceOf(const Words& command) {
     std::array<double, 3> ends[2];
     for (const int end : {0, 1}) {

@@ -86,7 +86,7 @@ TEST(EditedFunction, ChangesMakeItNoPreset) {
   EXPECT_EQ(edited.preset(), "");
 }
 
-/// Of an even histogram and opacities that rise as x, the share below x is x squared.
+/// The share below x is x squared where the histogram is even and opacities rise as x.
 TEST(EditedFunction, AnIsosurfaceBeginsInTheMiddleOfWhatIsSeen) {
   EditedFunction function("viridis", 10, 20, 1);
   function.setOpacities({{0, 0}, {1, 1}});

@@ -182,7 +182,7 @@ double CacheView::zoomForBars() const {
   return fitted_width_ > 0 ? std::min(1.0, data_size_.width / fitted_width_) : 1;
 }
 
-/// That of the panels, in pixels.
+/// Returns the size of the panels' font, in pixels.
 double CacheView::textSize() const {
   return std::round(window_.pixelScale() * window_.fontSize());
 }

@@ -13,7 +13,7 @@
 
 namespace curvisplat {
 
-/// What an error is about: it goes when the next attempt at the same succeeds.
+/// Names what failed: the error goes when the next attempt at the same succeeds.
 enum class About { kNothing, kOpening, kPicture, kSaving, kFunction };
 
 struct Toast {
@@ -56,7 +56,7 @@ class Reports {
   /// Shows and prints the error, but not again while it is shown.
   void report(const std::exception& error, About about = About::kNothing);
   void report(const std::string& text, About about = About::kNothing);
-  /// It has succeeded.
+  /// Removes the errors about something that has succeeded.
   void settle(About about) { toasts_.settle(about); }
 
  private:
