@@ -95,7 +95,7 @@ TEST_F(Frames, AnOrbitBeginsAtTheCameraThatWasGiven) {
   EXPECT_GT(position[1].get<double>(), focal_point[1].get<double>() + 1);
 }
 
-/// It is in perspective, from the side that a picture without options has, and further away: all of the data is in every picture.
+/// The orbit is in perspective, from the side of a picture without options, and further away, with all of the data.
 TEST_F(Frames, AnOrbitBeginsAtTheChosenView) {
   expectDrawn({"-o", file("chosen.png"), "--stats", file("chosen.json")});
   expectDrawn({"-o", file("c%d.png"), "--orbit", "360", "--frames", "7", "--stats", file("c.json")});

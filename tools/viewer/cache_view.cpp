@@ -167,7 +167,7 @@ void CacheView::draw(const WindowLayout& layout) {
   drawStatus(layout);
 }
 
-/// Where bars take more of its width than they did when the view was fitted, the view zooms out, and in again when they go:
+/// Zooms out where bars take more of the width than they did when the view was fitted, and in again when they go, so that
 /// what is between the picture's sides stays there.
 void CacheView::fitTo(ImageSize size) {
   const double before = zoomForBars();
