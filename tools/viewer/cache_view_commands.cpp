@@ -170,8 +170,9 @@ void CacheView::saveMovieOf(MovieKind kind) {
   movie_kind_ = kind;
   const MovieRequest movie = newMovie({});
   FileDialog::MovieOffer offer{movie.size, movie.frames_per_s, {}};
-  offer.frames = [this, frames = framesOf(movie), kind](double rate) {
-    return kind == MovieKind::kFilm ? film_.frames(rate) : frames;
+  // The dialog may outlive this view.
+  offer.frames = [film = film_, frames = framesOf(movie), kind](double rate) {
+    return kind == MovieKind::kFilm ? film.frames(rate) : frames;
   };
   dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", std::move(offer));
 }
