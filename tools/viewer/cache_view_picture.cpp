@@ -397,6 +397,7 @@ void CacheView::choose(const MenuChoice& choice) {
   if (choice.faces) addFaces(*choice.faces);
   if (choice.looks_for_scalars) further_.look();
   if (choice.add_scalar) wanted_scalar_ = WantedScalar{*choice.add_scalar};
+  if (choice.add_opacity_scalar) wanted_scalar_ = WantedScalar{*choice.add_opacity_scalar, true};
   if (choice.scalar) chooseScalar(*choice.scalar);
   if (choice.opacity_scalar)
     chooseOpacityScalar(*choice.opacity_scalar == otherScalars().front() ? "" : *choice.opacity_scalar);

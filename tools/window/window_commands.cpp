@@ -122,6 +122,14 @@ std::string shortNames(const std::vector<std::string>& files) {
   return text;
 }
 
+void listNames(const char* title, const std::vector<std::string>& names, const std::string& now,
+               std::optional<std::string>& choice) {
+  for (const std::string& name : names) {
+    if (ImGui::MenuItem(name.c_str(), nullptr, name == now)) choice = name;
+    nameWidget(fmt::format("item {} {}", title, name));
+  }
+}
+
 void chooseOne(const char* title, const std::vector<std::string>& names, const std::string& now,
                std::optional<std::string>& choice, Window& window) {
   const bool open = ImGui::BeginMenu(title, !names.empty());
@@ -130,26 +138,43 @@ void chooseOne(const char* title, const std::vector<std::string>& names, const s
     return;
   }
   window.coverCurrent();
-  for (const std::string& name : names) {
-    if (ImGui::MenuItem(name.c_str(), nullptr, name == now)) choice = name;
-    nameWidget(fmt::format("item {} {}", title, name));
-  }
+  listNames(title, names, now, choice);
   ImGui::EndMenu();
 }
 
-/// Scalars of the cache's sources that it lacks.
+/// Lists scalars of the cache's sources that it lacks.
+void listFurther(const FurtherScalars& further, const char* title, std::optional<std::string>& chosen,
+                 MenuChoice& choice) {
+  choice.looks_for_scalars = true;
+  if (further.is_looking) ImGui::TextDisabled("looking into %s ...", further.from.c_str());
+  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
+  for (const SourceScalar& one : further.scalars) {
+    if (ImGui::MenuItem(one.name.c_str(), one.derived ? "computed" : nullptr)) chosen = one.name;
+    nameWidget(fmt::format("item {} {}", title, one.name));
+  }
+}
+
 void chooseFurther(const FurtherScalars& further, MenuChoice& choice, Window& window) {
   if (!ImGui::BeginMenu("Add scalar", !further.from.empty() && !further.is_busy)) {
     nameWidget("menu Add scalar");
     return;
   }
   window.coverCurrent();
-  choice.looks_for_scalars = true;
-  if (further.is_looking) ImGui::TextDisabled("looking into %s ...", further.from.c_str());
-  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
-  for (const SourceScalar& one : further.scalars) {
-    if (ImGui::MenuItem(one.name.c_str(), one.derived ? "computed" : nullptr)) choice.add_scalar = one.name;
-    nameWidget("item Add scalar " + one.name);
+  listFurther(further, "Add scalar", choice.add_scalar, choice);
+  ImGui::EndMenu();
+}
+
+void chooseOpacityScalar(const MenuFacts& facts, MenuChoice& choice, Window& window) {
+  if (!ImGui::BeginMenu("Opacity by", !facts.opacity_scalars.empty())) {
+    nameWidget("menu Opacity by");
+    return;
+  }
+  window.coverCurrent();
+  listNames("Opacity by", facts.opacity_scalars, facts.opacity_scalar, choice.opacity_scalar);
+  if (!facts.further.from.empty() && !facts.further.is_busy) {
+    ImGui::Separator();
+    ImGui::TextDisabled("more, added when chosen:");
+    listFurther(facts.further, "Opacity by", choice.add_opacity_scalar, choice);
   }
   ImGui::EndMenu();
 }
@@ -212,7 +237,7 @@ MenuChoice drawMenus(const MenuFacts& facts, Window& window) {
       drawMenu(menu, facts, choice, window);
       if (std::string_view(menu) == "Data") {
         chooseOne("Scalar", facts.scalars, facts.scalar, choice.scalar, window);
-        chooseOne("Opacity by", facts.opacity_scalars, facts.opacity_scalar, choice.opacity_scalar, window);
+        chooseOpacityScalar(facts, choice, window);
         chooseFurther(facts.further, choice, window);
       }
       ImGui::EndMenu();

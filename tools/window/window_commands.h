@@ -114,7 +114,7 @@ struct MenuFacts {
 struct MenuChoice {
   std::vector<Command> commands;
   std::optional<std::vector<std::string>> open;  // files
-  std::optional<std::string> scalar, opacity_scalar, view, faces, add_scalar;
+  std::optional<std::string> scalar, opacity_scalar, view, faces, add_scalar, add_opacity_scalar;
   bool looks_for_scalars = false;  // for what the cache's sources have and the cache lacks
 };
 
