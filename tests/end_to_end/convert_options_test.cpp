@@ -65,6 +65,10 @@ TEST_F(ConvertOptionsTest, GivesTheSameCacheForAnyThreadsAndMemory) {
 TEST_F(ConvertOptionsTest, TakesAGridAfterItsSolutionAndAllScalarsWithADerivedOne) {
   run({"convert", file("wake.fun"), file("wake.xyz"), "-o", file("a.splats"), "--scalar", "all,volume"});
   run(convert({"--scalar", "all", "--scalar", "volume"}));
+  // All files that there are, as they are chosen in a dialog.
+  for (const Words& files : {Words{file("wake.fun"), file("wake.nam"), file("wake.xyz")},
+                             Words{file("wake.nam"), file("wake.xyz"), file("wake.fun")}})
+    run(Words{"info"} + files);
   for (const char* const name : {"geometry.bin", "var.0.bin", "var.1.bin"})
     EXPECT_TRUE(readTextFile(folder_ / "a.splats" / name) == readTextFile(folder_ / "wake.splats" / name))
         << name;

@@ -116,6 +116,11 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
   EXPECT_TRUE(gone("mark at "));
   tab("Objects");
   placeOf("isosurface 1 is not drawn");
+  click("draw isosurface 1");
+  EXPECT_TRUE(gone("isosurface 1 is not drawn"));
+  press("ctrl+z");
+  placeOf("isosurface 1 is not drawn");
+  moveTo(rest_);
   const Image without = saveAndCopy();
   click("eye of volume");
   moveTo(rest_);

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <string>
 
+#include "stream/base/text.h"
+
 namespace curvisplat {
 namespace {
 
@@ -49,17 +51,7 @@ struct FilmPanel::TimeScale {
 void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelActions& actions) {
   FilmActions& does = actions.film;
   const bool has_keys = !film.keys().empty(), selects = film.selected().has_value();
-  if (has_keys) {
-    drawPictures(film, pictures, does);
-    drawTimeLine(film, actions);
-    drawTime(film, does);
-  } else {
-    ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
-    ImGui::TextWrapped(
-        "A key frame keeps the camera, the colours, the cuts and the time step. Add one, change the picture, "
-        "add the next.");
-    ImGui::PopStyleColor();
-  }
+  // The buttons stay where they are when the first key frame is added: "add" is pressed again and again.
   does.add |=
       button("add key frame", "add key frame", true, "of what is shown now, after the one that is selected");
   ImGui::SameLine();
@@ -78,6 +70,17 @@ void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelAc
   ImGui::SameLine();
   commandButton(Command::kCopyFilmCommand, actions, "copy command");
   ImGui::EndDisabled();
+  if (has_keys) {
+    drawPictures(film, pictures, does);
+    drawTimeLine(film, actions);
+    drawTime(film, does);
+  } else {
+    ImGui::PushStyleColor(ImGuiCol_Text, ImGui::GetStyleColorVec4(ImGuiCol_TextDisabled));
+    ImGui::TextWrapped(
+        "A key frame keeps the camera, the colours, the cuts and the time step. Add one, change the picture, "
+        "add the next.");
+    ImGui::PopStyleColor();
+  }
 }
 
 void FilmPanel::drawPictures(const FilmEdit& film, const FilmPictures& pictures, FilmActions& actions) {
@@ -184,7 +187,7 @@ void FilmPanel::drawTime(const FilmEdit& film, FilmActions& actions) {
   ImGui::EndDisabled();
   ImGui::SameLine();
   const std::string length =
-      fmt::format("of {:.4g} s, {} pictures", film.end() - film.begin(), film.frames());
+      fmt::format("of {:.4g} s, {}", film.end() - film.begin(), countText(film.frames(), "picture"));
   ImGui::TextDisabled("%s", length.c_str());
   nameWidget("film length " + length);
 }

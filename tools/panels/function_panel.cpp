@@ -265,8 +265,8 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
       changed = true;
     }
     nameWidget(fmt::format("colour {}", n + 1));
-    ImGui::SameLine(0, ImGui::CalcTextSize("colour").x - ImGui::GetFrameHeight() +
-                           ImGui::GetStyle().ItemSpacing.x);
+    ImGui::SameLine(
+        0, ImGui::CalcTextSize("colour").x - ImGui::GetFrameHeight() + ImGui::GetStyle().ItemSpacing.x);
     const double scalar = function.scalarAt(point.x);
     ImGui::SetNextItemWidth(0.4f * ImGui::GetContentRegionAvail().x);
     ImGui::BeginDisabled(end);
@@ -347,7 +347,7 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
     function.setOpacities({points.begin(), points.end()});
     result.changed = true;
   };
-  set("band", "values in the middle of the range alone; drag it where it is wanted", kBand);
+  set("band", "values in the middle of the range alone; drag its points to others", kBand);
   set("clear", "nothing; add points for what is to be seen", kClear);
 }
 

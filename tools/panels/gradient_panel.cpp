@@ -83,13 +83,14 @@ GradientPanel::Result GradientPanel::draw(std::vector<OpacityPoint>& points, siz
     if (point.opacity <= points.front().opacity) from = static_cast<float>(point.x);
   for (size_t n = points.size(); n-- > 0;)
     if (points[n].opacity >= points.back().opacity) to = static_cast<float>(points[n].x);
+  label("shown from");
   if (ImGui::DragFloatRange2("##gradient", &from, &to, 0.003f, 0, 1, "from %.2f", "to %.2f")) {
     points = rampBetween(std::clamp(from, 0.0f, 1.0f), std::clamp(std::max(from, to), 0.0f, 1.0f));
     result.changed = true;
   }
   result.dragging = ImGui::IsItemActive();
   nameWidget("gradient shares");
-  hint("shares of the volume that is less steep");
+  hint("the shares of the volume that is less steep, where opacity begins and where it is whole");
   return result;
 }
 

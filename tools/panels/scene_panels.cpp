@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "render/annotate/annotations.h"
 #include "tools/panels/labels.h"
@@ -16,6 +17,16 @@
 
 namespace curvisplat {
 namespace {
+
+/// Says what the faces of a name are; empty for names that say it themselves.
+std::string meaningOf(const std::string& faces) {
+  constexpr const char* kNotCut = "clip planes and the clip box do not cut them";
+  if (faces == "all") return fmt::format("all outer faces of the grid; {}", kNotCut);
+  const bool is_lower = faces.ends_with("min"), is_upper = faces.ends_with("max");
+  if (faces.size() != 4 || faces[0] < 'i' || faces[0] > 'k' || is_lower == is_upper) return {};
+  return fmt::format("the faces of the grid where {} is {}; {}", faces[0], is_lower ? "least" : "greatest",
+                     kNotCut);
+}
 
 /// The direction in which a plane's place is counted, of unit length, and its name.
 struct PlaneScale {
@@ -235,7 +246,7 @@ void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
     actions.changed = true;
   }
   actions.dragging |= ImGui::IsItemActive();
-  actions.changed |= ImGui::Checkbox("times the function's", &state.slice_opacity.by_function);
+  actions.changed |= ImGui::Checkbox("times the volume's", &state.slice_opacity.by_function);
   nameWidget("slices by function");
 }
 
@@ -249,13 +260,14 @@ void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces,
 void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>& faces,
                                 PanelActions& actions) {
   const bool is_full = state.surfaces.size() + state.faces.size() >= kMaxSurfaces;
-  label("add grid face");
+  label("add wall or grid face");
   ImGui::BeginDisabled(faces.empty() || is_full);
   if (ImGui::BeginCombo("##add surface", faces.empty() ? "the cache has none" : "choose ...",
                         ImGuiComboFlags_HeightLarge)) {
     for (const std::string& name : faces) {
       if (ImGui::Selectable(name.c_str())) actions.add_faces = name;
       nameWidget("add surface " + name);
+      if (const std::string what = meaningOf(name); !what.empty()) hint(what.c_str());
     }
     ImGui::EndCombo();
   } else {
@@ -278,7 +290,7 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
       removed = n;
     opacitySlider("opacity", "opacity of " + name, named.opacity.factor, actions);
     ImGui::BeginDisabled(!state.faces_by && !state.opacity_by);
-    actions.changed |= ImGui::Checkbox("times the function's", &named.opacity.by_function);
+    actions.changed |= ImGui::Checkbox("times the volume's", &named.opacity.by_function);
     nameWidget(name + " by function");
     ImGui::EndDisabled();
     ImGui::PopID();
@@ -325,7 +337,7 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
   ImGui::BeginDisabled(state.isosurfaces.empty());
   opacitySlider("opacity", "opacity of isosurfaces", state.iso_opacity.factor, actions);
   ImGui::BeginDisabled(state.hasIsosurfacesOfThird());
-  actions.changed |= ImGui::Checkbox("times the function's", &state.iso_opacity.by_function);
+  actions.changed |= ImGui::Checkbox("times the volume's", &state.iso_opacity.by_function);
   nameWidget("isosurfaces by function");
   ImGui::EndDisabled();
   ImGui::EndDisabled();
@@ -343,11 +355,15 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
     if (chosen) actions.isosurface_scalar = {n, *chosen};
     drawValueOf(one, name, actions);
     if (one.visible && one.scalar != state.isoScalar()) {
-      ImGui::TextDisabled("drawn when the picture or its opacities show it");
+      ImGui::TextDisabled("not drawn: those of %s are", state.isoScalar().c_str());
       nameWidget(name + " is not drawn");
+      ImGui::SameLine();
+      if (ImGui::SmallButton("draw it"))
+        actions.opacity_scalar = one.scalar == state.variable ? "" : one.scalar;
+      nameWidget("draw " + name);
       hint(
-          "one scalar's isosurfaces are drawn at a time: that of the opacities, or of the colours;\n"
-          "without the volume, any scalar's");
+          "One scalar's isosurfaces are drawn at a time: that of the opacities, or of the colours;\n"
+          "without the volume, any scalar's. This takes the volume's opacities from the scalar.");
     }
     ImGui::PopID();
   }

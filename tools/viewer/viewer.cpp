@@ -86,7 +86,8 @@ class Viewer {
     saves_picture_ = request.kind == MovieKind::kOnePicture;
     const fs::path name = (saves_picture_ ? request.file : movieNameOf(request.file)).filename();
     movie_ = std::make_unique<BackgroundJob>(
-        fmt::format("saving {}", name.string()), "beginning",
+        fmt::format("saving {}", name.string()),
+        fmt::format("drawing {} x {}", request.size.width, request.size.height),
         [movie = std::make_shared<MovieRequest>(std::move(request)),
          open = options_.open_movie](Progress& progress) { return drawMovie(*movie, open, progress); },
         Window::wake);

@@ -211,7 +211,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
 
 float FileDialog::heightBelow() const {
   const float lines = *purpose_ == Purpose::kSavePicture ? 3.6f
-                      : *purpose_ == Purpose::kSaveMovie ? 4.6f
+                      : *purpose_ == Purpose::kSaveMovie ? 5.6f
                                                          : 2.6f;
   return lines * ImGui::GetFrameHeightWithSpacing();
 }
@@ -307,11 +307,16 @@ void FileDialog::drawEntries(bool& accepts) {
     if (!entry.is_folder && entry.bytes > 0) {
       const std::string size = sizeText(entry.bytes);
       ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::CalcTextSize(size.c_str()).x);
-      ImGui::TextDisabled("%s", size.c_str());
+      if (isTaken(entry.name))
+        ImGui::TextUnformatted(size.c_str());
+      else
+        ImGui::TextDisabled("%s", size.c_str());
     }
     if (!chosen) continue;
     const bool twice = ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
     if (entry.is_folder) {
+      // Named, it is entered by "open", too.
+      if (!lookOf(*purpose_).saves) select({entry.name});
       if (twice) entered = folder_ / entry.name;
       continue;
     }

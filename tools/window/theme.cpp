@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <initializer_list>
 
 namespace curvisplat {
@@ -28,6 +29,10 @@ void setTheme(ImGuiStyle& style, bool light) {
     set(ImGuiCol_HeaderActive, 0.2f, 0.45f, 0.75f, 0.6f);
     set(ImGuiCol_FrameBgActive, 0.2f, 0.45f, 0.75f, 0.67f);
   }
+  // What lies behind a dialog gets darker in both themes, and numbers are legible through what moves along a slider.
+  set(ImGuiCol_ModalWindowDimBg, 0, 0, 0, 0.45f);
+  for (const ImGuiCol grab : {ImGuiCol_SliderGrab, ImGuiCol_SliderGrabActive})
+    style.Colors[grab].w = std::min(style.Colors[grab].w, 0.5f);
   style.Colors[ImGuiCol_PopupBg].w = style.Colors[ImGuiCol_WindowBg].w = 1;
 }
 

@@ -238,10 +238,20 @@ std::unique_ptr<DataSource> openInAnyOrder(const OpenGridOptions& options) {
   }
 }
 
+/// Leaves out the files of names (PLOT3D's .nam), which are found beside their function files, where others are chosen, too.
+void leaveOutNames(OpenGridOptions& options) {
+  const auto isOfNames = [](const std::filesystem::path& file) { return file.extension() == ".nam"; };
+  std::erase_if(options.solutions, isOfNames);
+  if (!isOfNames(options.grid) || options.solutions.empty()) return;
+  options.grid = options.solutions.front();
+  options.solutions.erase(options.solutions.begin());
+}
+
 }  // namespace
 
 std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   OpenGridOptions complete = options;
+  leaveOutNames(complete);
   if (complete.temporary_folder.empty()) complete.temporary_folder = systemTemporaryFolder();
   std::unique_ptr<DataSource> source =
       cutCurved(openInAnyOrder(complete), options.cut_curved.value_or(true), complete.temporary_folder);
