@@ -290,6 +290,8 @@ def markers(tab):
         return
     marker = tab.run(f"{PAGE}.state.markers[0]")
     expect(marker["name"] == "1" and marker["value"] == marker["value"] and len(marker["point"]) == 3, f"a marker: {marker}")
+    names = tab.run("[...document.querySelectorAll('.sign, #markers span')].map(e => e.textContent)")
+    expect(len(names) == 2 and all(text.startswith(f"1: {marker['scalar']} ") for text in names), f"its texts name its scalar: {names}")
     sign = "(() => { const r = document.querySelector('.sign').getBoundingClientRect(); return [r.x, r.y + r.height / 2]; })()"
     left, middle = tab.run(sign)
     expect(abs(left - 8 - x) < 4 and abs(middle - y) < 4, f"its sign is at the click: {left - 8}, {middle}, not {x}, {y}")
@@ -313,6 +315,19 @@ def two_scalars(tab):
     expect(tab.run(f"{PAGE}.state.function.Points") == own, "the colours' function is as it was")
     changes(tab, lambda: set_value(tab, "#opacity_by", ""), "the same scalar again")
     expect(tab.run(f"{PAGE}.state.opacity_by") is None, "one scalar again")
+    # A marker keeps the scalar that it was set in.
+    tab.key("z")
+    rest(tab)
+    for place in ((800, 400), (760, 300), (700, 300), (860, 300), (700, 500)):
+        if not tab.run(f"{PAGE}.state.markers.length"):
+            tab.mouse("mousePressed", *place, buttons=1)
+            tab.mouse("mouseReleased", *place)
+            wait_for(lambda: tab.run(f"{PAGE}.state.markers.length + {PAGE}.errors.length"), "a marker or an error")
+            tab.run(f"{PAGE}.errors.length = 0")
+    text = tab.run("document.querySelector('.sign').textContent")
+    changes(tab, lambda: set_value(tab, "#scalar", names[1]), "another scalar", "marker_of_another_scalar")
+    expect(f" {tab.run(PAGE + '.state.markers[0].scalar')} " in text, f"a sign names its scalar: {text}")
+    expect(tab.run("document.querySelector('.sign').textContent") == text, f"under another scalar it is still {text}")
     expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
 
 
