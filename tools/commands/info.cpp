@@ -20,6 +20,7 @@
 #include "render/automatic/first_choice.h"
 #include "render/backend/backend.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
@@ -34,6 +35,7 @@
 #include "tools/commands/info_steps.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/frame_sequence.h"
+#include "tools/options/grid_surfaces.h"
 #include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
@@ -216,6 +218,15 @@ Findings examine(const CacheReader& reader, const std::vector<StepPosition>& pos
   return found;
 }
 
+/// The faces that `render --surface` names. None, with a warning, where they are damaged: the rest is printed, and
+/// --verify goes on.
+std::vector<std::string> facesOf(const CacheReader& reader) try {
+  return faceNamesOf(reader);
+} catch (const Error& error) {
+  printMessage("warning: the faces cannot be read: {}", error.what());
+  return {};
+}
+
 Json asJson(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& manifest = reader.manifest();
   Json json = Json::parse(manifest.toJson());
@@ -240,6 +251,7 @@ Json asJson(const CacheReader& reader, const InfoOptions& options, const Finding
                                                     {"typical", picture->typical}}
                                              : Json(nullptr));
   }
+  json["faces"] = facesOf(reader);
   json["bytes"] = totalBytes(manifest);
   json["bytes_per_node"] = bytesPerSample(manifest, totalBytes(manifest));
   json["bricks_by_level"] = Json::array();
@@ -312,6 +324,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
              countText(m.blocks.size(), "block"), m.blanked_nodes);
   printRefinement(m);
   fmt::print("splats     {} at the finest level\n", m.splats);
+  if (const std::vector<std::string> faces = facesOf(reader); !faces.empty())
+    printLine("faces      {}", listed(faces));
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {
     const auto [means, slopes] = storedErrors(reader, v);
