@@ -357,6 +357,16 @@ class Data(PythonTest):
                 with self.assertRaisesRegex(curvisplat.UsageError, words):
                     cache.points(**wrong)
 
+    def test_help_is_of_the_package_alone(self):
+        """help(curvisplat) has what the package adds, and none of what its arrays inherit."""
+        import pydoc
+        text = pydoc.render_doc(curvisplat, renderer=pydoc.plaintext)
+        for name in curvisplat.__all__:
+            self.assertIn(name, text)
+        self.assertIn("Writes the picture as .png", text)
+        self.assertNotIn("tobytes", text)  # a method of numpy's arrays
+        self.assertLess(len(pydoc.render_doc(curvisplat.Picture, renderer=pydoc.plaintext).splitlines()), 100)
+
     def test_are_documented_and_typed(self):
         """Everything public has a docstring, and what the stubs say of the module is there."""
         import ast

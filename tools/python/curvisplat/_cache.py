@@ -6,7 +6,7 @@ import os
 import pathlib
 import tempfile
 import warnings
-from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -51,7 +51,15 @@ class Points(NamedTuple):
     shapes: np.ndarray
 
 
-class Picture(np.ndarray):
+class _ListsItsOwn(type):
+    """Has dir() and help() list what a class adds to numpy's array, and not the array's 2,200 lines."""
+
+    def __dir__(cls) -> List[str]:
+        inherited = set(dir(np.ndarray)) - set(vars(cls))
+        return [name for name in super().__dir__() if name not in inherited]
+
+
+class Picture(np.ndarray, metaclass=_ListsItsOwn):
     """An array of shape (height, width, 4): red, green and blue, premultiplied by alpha, and alpha; float32, rows from the top.
 
     `options` are those of `curvisplat render` that were chosen from the data, `notes` what there is to know about the
