@@ -7,6 +7,7 @@
 #include <array>
 #include <limits>
 
+#include "tools/throughput/machine.h"
 #include "tools/throughput/measurements.h"
 #include "tools/throughput/verdict.h"
 
@@ -17,6 +18,24 @@ TEST(Measurements, MedianIsTheMiddleSampleOrTheMeanOfTwo) {
   EXPECT_EQ(medianOf({7}), 7);
   EXPECT_EQ(medianOf({9, 1, 4}), 4);
   EXPECT_EQ(medianOf({8, 1, 4, 2}), 3);
+}
+
+TEST(Machine, SaysBeforehandWhenOthersUseIt) {
+  Machine machine;
+  machine.cores = 4;
+  EXPECT_EQ(machine.busyNote(), "") << "the load is not known";
+  for (const double load : {0.0, 0.3, 1.0}) {
+    machine.load = load;
+    EXPECT_EQ(machine.busyNote(), "") << load;
+  }
+  machine.load = 2.5;
+  EXPECT_EQ(machine.busyNote(),
+            "the machine is busy (load 2.5 in the last minute, 4 cores): these figures will be too low; end "
+            "other programs or wait, and measure again");
+  EXPECT_EQ(machine.toJson()["load"], 2.5);
+  const Machine here = Machine::here(".");
+  ASSERT_TRUE(here.load);
+  EXPECT_GE(*here.load, 0);
 }
 
 TEST(Measurements, SpreadIsHalfTheRangeOverTheMedian) {

@@ -94,6 +94,13 @@ void printMachine(const Machine& machine) {
              static_cast<double>(machine.memory_bytes) / (1 << 30), machine.system, machine.file_system);
 }
 
+/// Describes the machine before anything is measured.
+Machine describedMachine(const fs::path& folder) {
+  Machine machine = Machine::here(folder);
+  if (const std::string note = machine.busyNote(); !note.empty()) printMessage("note: {}", note);
+  return machine;
+}
+
 void printSection(const std::string& head, const std::string& text) {
   if (!text.empty()) fmt::print("\n{}\n\n{}", head, text);
 }
@@ -214,7 +221,7 @@ void benchCache(const BenchArguments& arguments) {
   };
   const ThroughputScene scene{cache, variable, function, options, backend, orbit};
   const std::string backend_name = FrameRenderer(cache, variable, function, backend).backendName();
-  const Machine machine = Machine::here(cache.path());
+  const Machine machine = describedMachine(cache.path());
   const Effort effort = arguments.quick ? kQuick : Effort{};
 
   printLine("{}: {} samples as {} splats in {} bricks; scalar {}", arguments.cache.string(), manifest.nodes,
@@ -288,7 +295,7 @@ void benchConversion(const BenchArguments& arguments) {
   if (!fs::is_directory(effort.temporary_folder, ignored))
     throw Error("--tmp {}: no such directory", effort.temporary_folder.string());
 
-  const Machine machine = Machine::here(effort.temporary_folder);
+  const Machine machine = describedMachine(effort.temporary_folder);
   Measurements measurements;
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <thread>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/os.h"
+#include "stream/base/text.h"
 #include "stream/paging/async_reads.h"
 
 namespace curvisplat {
@@ -27,15 +29,24 @@ Machine Machine::here(const std::filesystem::path& folder) {
   utsname name{};
   if (::uname(&name) == 0) machine.system = std::string(name.sysname) + " " + name.release;
   machine.file_system = fileSystemOf(folder);
+  double load = 0;
+  if (::getloadavg(&load, 1) == 1) machine.load = load;
   return machine;
 }
 
 nlohmann::ordered_json Machine::toJson() const {
-  return {{"processor", processor},
-          {"cores", cores},
-          {"memory_bytes", memory_bytes},
-          {"system", system},
-          {"file_system", file_system}};
+  return {{"processor", processor},       {"cores", cores},
+          {"memory_bytes", memory_bytes}, {"system", system},
+          {"file_system", file_system},   {"load", load ? nlohmann::ordered_json(*load) : nullptr}};
+}
+
+std::string Machine::busyNote() const {
+  constexpr double kBusyShare = 0.25;  // of the cores; a desktop at rest has a load of 0.1 to 0.3
+  if (!load || *load <= kBusyShare * cores) return {};
+  return fmt::format(
+      "the machine is busy (load {:.1f} in the last minute, {}): these figures will be too low; end other "
+      "programs or wait, and measure again",
+      *load, countText(cores, "core"));
 }
 
 uint64_t availableMemory() {

@@ -19,9 +19,13 @@ struct Machine {
   uint64_t memory_bytes = 0;
   std::string system;       // "Linux 6.1.0"
   std::string file_system;  // of the measured folder: "ext4"
+  /// Processes that ran or wanted to, on the average of the last minute; nullopt if the system does not tell.
+  std::optional<double> load = std::nullopt;
 
   static Machine here(const std::filesystem::path& folder);
   nlohmann::ordered_json toJson() const;
+  /// One line, if so many other programs use the machine that measurements begun now would be wrong; else empty.
+  std::string busyNote() const;
 };
 
 /// Memory that programs can have without swapping, in bytes; 0 if unknown.
