@@ -1,4 +1,5 @@
 // The convert subcommand, option by option, on the real program; also --add-scalar and --refine.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -6,13 +7,17 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <numbers>
+#include <regex>
+#include <string>
 #include <vector>
 
 #include "preprocess/formats/plot3d/plot3d_writer.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/file.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/program_test.h"
 
@@ -91,6 +96,23 @@ TEST_F(ConvertOptionsTest, TakesATrailingSlash) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "slash.splats" / "manifest.json"));
 }
 
+/// Expects that the line's first number, which has a unit, is `value` with two significant digits. `units`: by their names.
+void expectEstimated(const std::string& text, const std::string& line, double value,
+                     const std::map<std::string, double>& units) {
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(text, found, std::regex(line + "([0-9.]+) ([A-Za-z]+)"))) << line << text;
+  std::string digits = found.str(1);
+  const double unit = units.at(found.str(2));
+  std::erase(digits, '.');
+  digits.erase(0, digits.find_first_not_of('0'));
+  digits.erase(digits.find_last_not_of('0') + 1);
+  EXPECT_LE(digits.size(), 2u) << found.str();
+  EXPECT_NEAR(std::stod(found.str(1)) * unit, value, 0.051 * value) << found.str();
+}
+
+const std::map<std::string, double> kByteUnits{{"bytes", 1}, {"KiB", 0x1p10}, {"MiB", 0x1p20}};
+const std::map<std::string, double> kTimeUnits{{"s", 1}, {"min", 60}};
+
 /// --dry-run's forecast, and the conversion that it is of.
 void expectForecastHolds(const Words& conversion, const TemporaryFolder& folder) {
   const ProgramResult forecast =
@@ -106,6 +128,21 @@ void expectForecastHolds(const Words& conversion, const TemporaryFolder& folder)
   EXPECT_NEAR(found["cache_bytes"].get<double>() / static_cast<double>(bytes), 1, 0.05) << forecast.out;
   const auto peak = jsonOf(folder / "real.json")["peak_memory_bytes"].get<double>();
   EXPECT_NEAR(found["memory_bytes"].get<double>() / peak, 1, 0.3) << forecast.out;
+  for (const std::string name : {"cache", "temporary", "memory"})
+    if (found["steps"] == 1)  // a sample that was the whole grid has measured them
+      expectSays(forecast.out, fmt::format("  {:<10} {}", name, byteText(found[name + "_bytes"])));
+    else
+      expectEstimated(forecast.out, "  " + name + " +", found[name + "_bytes"], kByteUnits);
+  expectEstimated(forecast.out, "  time +", found["seconds"], kTimeUnits);
+}
+
+TEST_F(ConvertOptionsTest, InfoEstimatesWithTwoDigits) {
+  const auto estimate =
+      nlohmann::json::parse(run({"info", file("wake.xyz"), file("wake.fun"), "--json"}).out)["estimate"];
+  const std::string text = run({"info", file("wake.xyz"), file("wake.fun")}).out;
+  expectEstimated(text, "a cache of about ", estimate["cache_bytes"], kByteUnits);
+  expectEstimated(text, "with one scalar, ", estimate["cache_bytes_per_further_scalar"], kByteUnits);
+  expectEstimated(text, "scalar; about ", estimate["seconds"], kTimeUnits);
 }
 
 TEST_F(ConvertOptionsTest, ADryRunPredictsCostsAndLeavesNothing) {

@@ -45,13 +45,6 @@ std::filesystem::path temporaryFolderOf(const ConvertOptions& options) {
   return options.temporary_folder.empty() ? output.parent_path() : options.temporary_folder;
 }
 
-std::string timeText(double seconds) {
-  if (seconds < 10) return fmt::format("{:.1f} s", seconds);
-  if (seconds < 120) return fmt::format("{:.0f} s", seconds);
-  if (seconds < 7200) return fmt::format("{:.0f} min", seconds / 60);
-  return fmt::format("{:.1f} h", seconds / 3600);
-}
-
 std::string freeText(const std::filesystem::path& folder) {
   const auto bytes = freeBytes(folder);
   return bytes ? fmt::format(" ({} are free)", byteText(*bytes)) : "";
@@ -60,21 +53,24 @@ std::string freeText(const std::filesystem::path& folder) {
 void print(const Forecast& forecast, const ConvertOptions& options) {
   const std::filesystem::path output = std::filesystem::absolute(options.output).parent_path();
   const double samples = static_cast<double>(forecast.samples) * static_cast<double>(forecast.steps);
+  // A sample that was the whole grid has measured the sizes.
+  const bool is_measured = forecast.sampled == forecast.samples && forecast.steps == 1;
+  const auto size = is_measured ? byteText : estimatedBytes;
   const std::string of_steps = forecast.steps > 1 ? fmt::format(" in each of {} steps", forecast.steps) : "";
   if (forecast.sampled > 0)
-    fmt::print("{} samples{}; estimated from {} of them, converted in {}:\n", forecast.samples, of_steps,
-               forecast.sampled, timeText(forecast.sampling_seconds));
+    fmt::print("{} samples{}; estimated from {} of them, converted in {:.3g} s:\n", forecast.samples,
+               of_steps, forecast.sampled, forecast.sampling_seconds);
   else
     fmt::print("{} samples; estimated from its cells, and from conversions of other unstructured grids:\n",
                forecast.samples);
-  printLine("  cache      {} in {}{}, {:.2f} bytes per sample{}", byteText(forecast.cache_bytes),
+  printLine("  cache      {} in {}{}, {:.{}g} bytes per sample{}", size(forecast.cache_bytes),
             output.string(), freeText(output), static_cast<double>(forecast.cache_bytes) / samples,
-            forecast.steps > 1 ? " and step" : "");
+            is_measured ? 3 : 2, forecast.steps > 1 ? " and step" : "");
   const std::filesystem::path temporary = temporaryFolderOf(options);
-  printLine("  temporary  {} in {}{}", byteText(forecast.temporary_bytes), temporary.string(),
+  printLine("  temporary  {} in {}{}", size(forecast.temporary_bytes), temporary.string(),
             freeText(temporary));
-  fmt::print("  memory     {}\n", byteText(forecast.memory_bytes));
-  fmt::print("  time       {}, {}\n", timeText(forecast.seconds), countText(forecast.threads, "thread"));
+  fmt::print("  memory     {}\n", size(forecast.memory_bytes));
+  fmt::print("  time       {}, {}\n", estimatedTime(forecast.seconds), countText(forecast.threads, "thread"));
 }
 
 void finish(const Forecast& forecast, const ConvertOptions& options, const ConvertArguments& arguments) {

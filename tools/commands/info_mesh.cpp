@@ -35,10 +35,9 @@ nlohmann::ordered_json InfoEstimate::toJson() const {
 }
 
 std::string InfoEstimate::toText() const {
-  return fmt::format(
-      "a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {}",
-      byteText(needs_.cache_bytes), byteText(needs_.bytes_per_further_scalar), needs_.seconds,
-      countText(threads_, "thread"));
+  return fmt::format("a cache of about {} with one scalar, {} more per additional scalar; about {} on {}",
+                     estimatedBytes(needs_.cache_bytes), estimatedBytes(needs_.bytes_per_further_scalar),
+                     estimatedTime(needs_.seconds), countText(threads_, "thread"));
 }
 
 namespace {

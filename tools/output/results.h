@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -33,6 +34,10 @@ template <typename... Args>
 void printLine(fmt::format_string<Args...> format, Args&&... args) {
   fmt::print("{}\n", oneLine(fmt::format(format, std::forward<Args>(args)...)));
 }
+
+/// A size or a time that is an estimate, with the two digits that one can trust: "94 MiB", "1.2 GiB"; "0.35 s", "12 min".
+std::string estimatedBytes(uint64_t bytes);
+std::string estimatedTime(double seconds);
 
 /// A range of values as people read it: "-2.5 .. 0"; -0 is printed as 0. Numbers that are too small for single precision stand
 /// for smaller ones of the files.
