@@ -127,7 +127,13 @@ def navigation(browser, server, caches):
     for key in "xYzor":
         changes(tab, lambda key=key: tab.key(key), f"the key {key}", f"key_{key}")
     expect(tab.run(f"{PAGE}.state.camera.perspective"), "the key o changes the projection")
-    changes(tab, lambda: tab.click("#projection"), "the button of the projection")
+    changes(tab, lambda: tab.click("#projection"), "the box of the projection")
+    tab.key("o")  # the focus is on the box: keys are the picture's even so
+    rest(tab)
+    expect(tab.run(f"{PAGE}.state.camera.perspective && document.getElementById('projection').checked"), "the box shows the projection")
+    changes(tab, lambda: tab.run("document.querySelector('[data-view=\"-y\"]').click()"), "looking from -y")
+    away = tab.run(f"(c => c.position.map((v, i) => Math.sign(Math.round(1e6 * (v - c.focal_point[i])))))({PAGE}.state.camera)")
+    expect(away == [0, -1, 0], f"from -y the camera is at -y: {away}")
     tab.key("h")
     tab.wait("document.getElementById('panel').offsetWidth === 0", "the panel to hide")
     rest(tab)
