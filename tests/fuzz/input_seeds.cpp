@@ -81,6 +81,8 @@ void writeTexts(const Seeds& seeds) {
       "client_message", "histogram",
       R"({"type": "histogram", "cache": 0, "scalar": "density", "low": 0.1, "high": 1, "log": true})");
   seeds.write("client_message", "colours", R"({"type": "colours", "map": "viridis"})");
+  seeds.write("client_message", "command",
+              R"({"type": "command", "cache": 0, "size": [30, 20], "step": 0, "state": {}})");
   seeds.write("client_message", "pick", R"({"type": "pick", "x": 0.25, "y": 1})");
   seeds.write("client_message", "shown", R"({"type": "shown", "picture": 3})");
 }

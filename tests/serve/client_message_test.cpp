@@ -139,6 +139,12 @@ TEST(ClientMessage, IsReadWithEachType) {
   EXPECT_EQ(pick.x, 0.25);
   EXPECT_EQ(pick.y, 1);
   EXPECT_THROW(parsed<PickRequest>(R"({"type": "pick", "x": 1.1, "y": 0})"), Error);
+  const auto command = parsed<CommandRequest>(
+      R"({"type": "command", "cache": 1, "size": [30, 20], "step": 2, "state": {"a": 1}})");
+  EXPECT_EQ(command.cache, 1u);
+  EXPECT_EQ(command.size.height, 20);
+  EXPECT_EQ(command.step, 2u);
+  EXPECT_EQ(command.state, R"({"a":1})");
   EXPECT_EQ(parsed<ShownReport>(R"({"type": "shown", "picture": 3})").picture, 3u);
 }
 
@@ -171,6 +177,8 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
   refuses(R"({"type": "histogram", "cache": 0, "scalar": "a", "low": 0, "high": 2, "log": true})", "low");
   refuses(R"({"type": "colours", "map": ")" + std::string(1001, 'a') + R"("})", "map");
   refuses(R"({"type": "shown", "picture": 1e300})", "picture");
+  refuses(R"({"type": "command", "cache": 0, "size": [1, 1], "step": 0, "state": []})", "state");
+  refuses(R"({"type": "command", "cache": 0, "size": [1, 1], "step": -1, "state": {}})", "step");
   refuses(std::string(kLongestMessage + 1, ' '), "is too long");
   refuses(std::string(1000, '['), "has brackets");
   refuses("{\"type\": \"colours\", \"map\": \"\xff\xfe\"}", "is not JSON");

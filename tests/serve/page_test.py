@@ -5,6 +5,7 @@
 """
 import base64
 import pathlib
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -78,6 +79,38 @@ def opened(browser, url, size=(1280, 800)):
     return tab
 
 
+def differing_from(tab, file, by=0):
+    """How many bytes of the page's picture differ from the PNG file's by more than `by`."""
+    png = base64.b64encode(pathlib.Path(file).read_bytes()).decode()
+    return tab.run(f"""(async () => {{
+      const image = await createImageBitmap(new Blob([Uint8Array.from(atob('{png}'), c => c.charCodeAt(0))], {{type: 'image/png'}}));
+      const c = document.getElementById('picture'), other = new OffscreenCanvas(c.width, c.height);
+      if (image.width !== c.width || image.height !== c.height) return 'another size';
+      other.getContext('2d').drawImage(image, 0, 0);
+      const a = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+      const b = other.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+      let n = 0; for (let k = 0; k < a.length; ++k) n += Math.abs(a[k] - b[k]) > {by}; return n; }})()""")
+
+
+def copies_the_command(tab, caches):
+    """The command that the page shows draws its picture, in the folder of the cache."""
+    rest(tab)
+    tab.run("document.getElementById('copied-title').textContent = ''; document.getElementById('copy-command').click()")
+    tab.wait("document.getElementById('copied').open", "the command")
+    text = tab.run("document.getElementById('copied-text').value")
+    files = tab.run("[...document.querySelectorAll('#copied-files button')].map(b => b.textContent)")
+    shot(tab, "command")
+    tab.run("document.getElementById('copied').close()")
+    expect("/" not in text.split()[2], f"the command names no folder of the server: {text}")
+    expect(files == [], f"this function needs no file: {files}")
+    words = shlex.split(text)
+    expect(words[:2] == ["curvisplat", "render"], text)
+    subprocess.run([program, *words[1:]], cwd=pathlib.Path(caches[0]).parent, check=True, capture_output=True)
+    # Numbers of the command have six digits.
+    differing = differing_from(tab, pathlib.Path(caches[0]).parent / "picture.png", by=3)
+    expect(isinstance(differing, int) and differing < 200, f"the command draws the page's picture: {differing} bytes differ: {text}")
+
+
 def is_the_commands_picture(tab, server_caches):
     """The lossless picture on the page is the file that `render` writes."""
     rest(tab)
@@ -94,15 +127,7 @@ def is_the_commands_picture(tab, server_caches):
                    *(["--view-angle", repr(camera["view_angle"])] if camera["perspective"] else
                      ["--parallel-scale", repr(camera["parallel_scale"])])]
         subprocess.run(command, check=True, capture_output=True)
-        png = base64.b64encode(pathlib.Path(folder, "p.png").read_bytes()).decode()
-        differing = tab.run(f"""(async () => {{
-          const image = await createImageBitmap(await (await fetchPng('{png}')));
-          function fetchPng(text) {{ return new Blob([Uint8Array.from(atob(text), c => c.charCodeAt(0))], {{type: 'image/png'}}); }}
-          const c = document.getElementById('picture'), other = new OffscreenCanvas(c.width, c.height);
-          other.getContext('2d').drawImage(image, 0, 0);
-          const a = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
-          const b = other.getContext('2d').getImageData(0, 0, c.width, c.height).data;
-          let n = 0; for (let k = 0; k < a.length; ++k) n += a[k] !== b[k]; return n; }})()""")
+        differing = differing_from(tab, f"{folder}/p.png")
         expect(differing == 0, f"the page has the pixels of `render`: {differing} bytes differ")
 
 
@@ -461,6 +486,8 @@ with tempfile.TemporaryDirectory() as folder:
             print("navigation done")
             editing(tab)
             print("editing done")
+            copies_the_command(tab, caches)
+            print("command done")
             markers(tab)
             print("markers done")
             flying(tab)

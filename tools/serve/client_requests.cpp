@@ -133,6 +133,13 @@ std::string nameIn(const JsonField& message, const char* field) {
   return text;
 }
 
+std::string stateIn(const JsonField& message) {
+  const JsonField state = message.at("state");
+  if (!state.isObject()) state.fail("an object");
+  // Bytes that are no UTF-8 do not get here: the parser refuses them.
+  return state.json().dump();
+}
+
 ViewRequest viewIn(const JsonField& message, size_t caches) {
   ViewRequest view;
   view.number = message.at("number").count(0, kMaxNumber);
@@ -141,10 +148,7 @@ ViewRequest viewIn(const JsonField& message, size_t caches) {
   view.moving = message.at("moving").flag();
   view.step = message.at("step").count(0, kMaxNumber);
   if (const auto next = message.find("next")) view.next = next->count(0, kMaxNumber);
-  const JsonField state = message.at("state");
-  if (!state.isObject()) state.fail("an object");
-  // Bytes that are no UTF-8 do not get here: the parser refuses them.
-  view.state = state.json().dump();
+  view.state = stateIn(message);
   return view;
 }
 
@@ -177,8 +181,11 @@ ClientMessage parseClientMessage(std::string_view text, size_t caches) {
   if (name == "histogram") return histogramIn(message, caches);
   if (name == "colours") return ColoursRequest{nameIn(message, "map")};
   if (name == "pick") return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1)};
+  if (name == "command")
+    return CommandRequest{cacheIn(message, caches), sizeIn(message), message.at("step").count(0, kMaxNumber),
+                          stateIn(message)};
   if (name == "shown") return ShownReport{message.at("picture").count(0, kMaxNumber)};
-  type.fail("open, view, choose, histogram, colours, pick or shown");
+  type.fail("open, view, choose, histogram, colours, pick, command or shown");
 }
 
 }  // namespace curvisplat

@@ -21,6 +21,8 @@
 //   {"type": "colours", "map": "viridis"}        asks for a colour map's points
 //   {"type": "pick", "x": 0.4, "y": 0.7}         asks what the picture at rest shows there; x and y are
 //                                                fractions of its sides
+//   {"type": "command", "cache": 0,              asks for the `render` command of a view
+//    "size": [800, 600], "step": 0, "state": {...}}
 //   {"type": "shown", "picture": 3}              the page has drawn this picture
 //
 // The functions keep no state: any thread may call them.
@@ -99,12 +101,19 @@ struct ColoursRequest {
 struct PickRequest {
   double x = 0, y = 0;  // 0..1, from the upper left corner
 };
+/// A view, as in ViewRequest.
+struct CommandRequest {
+  size_t cache = 0;
+  ImageSize size;
+  uint64_t step = 0;
+  std::string state;
+};
 struct ShownReport {
   uint64_t picture = 0;
 };
 
 using ClientMessage = std::variant<OpenRequest, ViewRequest, FunctionRequest, HistogramRequest,
-                                   ColoursRequest, PickRequest, ShownReport>;
+                                   ColoursRequest, PickRequest, CommandRequest, ShownReport>;
 
 /// Parses and checks a message. `caches`: how many are served. Throws Error that begins with "message" for
 /// any other text.

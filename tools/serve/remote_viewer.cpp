@@ -85,6 +85,7 @@ class RemoteViewer::Work {
     if (inbox.function) answer([&] { return caches_.functionText(*inbox.function); });
     if (inbox.histogram) answer([&] { return caches_.histogramText(*inbox.histogram); });
     if (inbox.colours) answer([&] { return ServedCaches::coloursText(*inbox.colours); });
+    if (inbox.command) answer([&] { return commandText(*inbox.command); });
   }
 
  private:
@@ -112,6 +113,13 @@ class RemoteViewer::Work {
     const auto point = pointSeenAt(*values, reader.manifest(), pixel, asked.data);
     if (!point) throw UsageError("there is nothing at this place");
     return caches_.markerText(cache_, {asked.state.variable, values->step}, *point);
+  }
+
+  /// What is wrong with the request concerns the page alone.
+  std::string commandText(const CommandRequest& request) const try {
+    return caches_.commandText(request);
+  } catch (const Error& error) {
+    throw UsageError("{}", error.what());
   }
 
   template <typename Text>
@@ -318,6 +326,7 @@ void RemoteViewer::receive(ClientMessage message) {
     if (auto* const one = std::get_if<HistogramRequest>(&message)) inbox_.histogram = std::move(*one);
     if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
     if (auto* const pick = std::get_if<PickRequest>(&message)) inbox_.pick = *pick;
+    if (auto* const command = std::get_if<CommandRequest>(&message)) inbox_.command = std::move(*command);
     if (auto* const shown = std::get_if<ShownReport>(&message))
       if (inbox_.shown.size() < kMaxReports) inbox_.shown.push_back(shown->picture);
     news_ = true;

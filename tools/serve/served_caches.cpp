@@ -13,6 +13,7 @@
 #include "tools/view/edited_function.h"
 #include "tools/view/first_view.h"
 #include "tools/view/picture_layout.h"
+#include "tools/view/saved_views.h"
 
 namespace curvisplat {
 namespace {
@@ -177,6 +178,29 @@ std::string ServedCaches::coloursText(const ColoursRequest& request) {
   Json json = {{"type", "colours"}, {"map", request.map}};
   addFunction(json, EditedFunction(request.map, 0, 1, 1));
   return textOf(json);
+}
+
+std::string ServedCaches::commandText(const CommandRequest& request) const {
+  const CacheReader& reader = caches_[request.cache].reader;
+  const uint64_t steps = reader.series().steps.size();
+  if (request.step >= steps)
+    throw UsageError("there is no step {}; the last one is {}", request.step, steps - 1);
+  ViewState state = viewStateFromJson(request.state, "view", reader.manifest());
+  state.surfaces.clear();  // they name files
+  fs::path folder = reader.wholePath();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  CommandOptions options{folder.filename(), request.size, {}, {}};
+  Json files = Json::array();
+  const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
+    if (!needsFile(function)) return;
+    file = fmt::format("{}_{}.json", folder.stem().string(), what);
+    files.push_back({{"name", file.string()}, {"text", toParaViewPreset(function.definition())}});
+  };
+  keep(state.function, "colours", options.function_file);
+  if (state.opacity_by) keep(state.opacity_by->function, "opacities", options.opacity_file);
+  std::string text = renderCommand(state, options);
+  if (steps > 1) text += fmt::format(" --step {}", request.step);
+  return textOf({{"type", "command"}, {"cache", request.cache}, {"text", text}, {"files", files}});
 }
 
 std::string ServedCaches::errorText(std::string text) const {

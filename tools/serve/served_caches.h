@@ -42,6 +42,9 @@ class ServedCaches {
   };
   std::string markerText(size_t cache, const MarkedScalar& scalar, const glm::dvec3& point) const;
   static std::string coloursText(const ColoursRequest& request);
+  /// The `curvisplat render` command that draws a view, for a folder that has the cache, and the files of functions that its
+  /// options cannot state. Throws Error for a state that is not one of this cache.
+  std::string commandText(const CommandRequest& request) const;
 
   /// An error for a page: `text` without paths of this machine.
   std::string errorText(std::string text) const;
