@@ -302,6 +302,45 @@ def flying(tab):
     expect(not tab.run(f"{PAGE}.state.camera.perspective"), "orthographic again")
 
 
+def shared_address(browser, server, tab):
+    """Another browser's page at the copied address shows the same picture: cache, step, camera and function."""
+    tab.run("document.getElementById('cache').value = 1; document.getElementById('cache').onchange()")
+    tab.wait("!document.getElementById('time').hidden", "the series")
+    set_value(tab, "#step", "2")
+    set_value(tab, "#map", "magma")
+    tab.wait("document.getElementById('map').value !== 'magma' || strip.startsWith('000003')", "the colours")
+    tab.drag(MIDDLE, (850, 430), steps=5)
+    before = rest(tab)
+    tab.run("document.getElementById('copy-address').click()")
+    tab.wait("document.getElementById('copied').open", "the address")
+    address = tab.run("document.getElementById('copied-text').value")
+    shot(tab, "address")
+    tab.run("document.getElementById('copied').close()")
+    expect(address.startswith(server.url + "#"), f"the address is the server's: {address[:80]}")
+    expect(len(address) < 6000, f"the address is short: {len(address)} characters")
+    other = opened(browser, address)
+    expect(rest(other) == before, "the same picture")
+    expect(other.run("[cache.name, step, strip]") == tab.run("[cache.name, step, strip]"), "the same cache, step and colours")
+    # Each view leaves its address, so that a page that is loaded again shows what it showed.
+    tab.call("Page.reload")
+    tab.wait(f"{PAGE} && {PAGE}.pictures > 0", "a picture after loading again")
+    expect(rest(tab) == before, "loaded again, the page shows the same")
+    # In a page that is open, an address typed over the other one is shown, too.
+    tab.run("document.getElementById('fit').click()")
+    wait_for(lambda: rest(tab) != before, "another view")
+    other.run(f"location.hash = {tab.run('location.hash')!r}")
+    wait_for(lambda: rest(other) == rest(tab), "the page to follow its address")
+    # One that was cut off says so.
+    cut = opened(browser, address[:-40])
+    expect("not whole" in cut.run(f"{PAGE}.errors.join()"), "an address that was cut off is named")
+    expect(cut.run("cache.name") == "annulus", "and the first view is shown")
+    for one in (other, cut):
+        one.call("Page.navigate", url="about:blank")
+    tab.run("document.getElementById('cache').value = 0; document.getElementById('cache').onchange()")
+    tab.wait("cache.name === 'annulus'", "the first cache")
+    expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
+
+
 def markers(tab):
     """A click finds what is seen there; its sign follows the camera."""
     tab.run(f"{PAGE}.state.markers.length = 0")
@@ -494,6 +533,8 @@ with tempfile.TemporaryDirectory() as folder:
             print("flying done")
             sizes(tab)
             print("sizes done")
+            shared_address(browser, server, tab)
+            print("shared address done")
             time_steps(browser, server)
             print("time steps done")
             phone(browser, server)
