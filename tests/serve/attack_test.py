@@ -223,6 +223,11 @@ def broken_messages(server):
                 expect(str(folder) not in json.dumps(message), f"no path in {message}")
                 break
     expect(server.is_alive(), "the server lives after clicks")
+    # Faces that the grid lacks are refused, those that it has are drawn.
+    face = {"colour": [1, 0, 0], "opacity": 1, "by_function": False, "visible": True}
+    for name, is_drawn in (("jmin", True), ("../x", False), ("block 9:i=3", False), ("all", True)):
+        viewer.view(base | {"faces": [face | {"name": name}]})
+        expect(isinstance(viewer.picture(), bytes) == is_drawn, f"the face {name} is {'drawn' if is_drawn else 'refused'}")
     # Surfaces name files: none is read.
     secret = pathlib.Path(folder, "secret.stl")
     secret.write_text("solid x\nendsolid x\n")

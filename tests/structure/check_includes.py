@@ -30,7 +30,7 @@ PROGRAM_ROOMS = {
     "tools/mpi": set(),
     "tools/vdb": set(),
     "tools/options": {"tools/output"},
-    "tools/commands": {"tools/output", "tools/options", "tools/serve", "tools/throughput", "tools/viewer",
+    "tools/commands": {"tools/output", "tools/options", "tools/serve", "tools/throughput", "tools/view", "tools/viewer",
                        "tools/window"},
     "tools/python": {"tools/output", "tools/options", "tools/view"},
     "tools": {"tools/output", "tools/options", "tools/commands"},

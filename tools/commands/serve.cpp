@@ -16,6 +16,8 @@
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/grid_faces.h"
+#include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
@@ -44,6 +46,7 @@ ServerOptions optionsFrom(const ServeArguments& arguments) {
   options.host_names = arguments.hosts;
   options.each.memory_bytes = parseByteSize("--viewer-memory", arguments.viewer_memory);
   options.each.backend = parseBackend(arguments.backend);
+  options.each.faces_at = facesAtStep;
   if (arguments.frame_time)
     options.each.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
   const uint64_t memory = parseByteSize("--memory", arguments.memory);
@@ -73,7 +76,7 @@ void serve(const ServeArguments& arguments) {
   returnFreedMemory(kLargeBlock);
   const ServerOptions options = optionsFrom(arguments);
   warnOfNetwork(options);
-  const ServedCaches caches(arguments.caches);
+  const ServedCaches caches(arguments.caches, faceNamesOf);
   requireThreads();
   Progress progress;
   const StopOnSignals stopping(progress);

@@ -18,6 +18,7 @@
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/grid_faces.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/example_grid.h"
 #include "tools/options/frame_sequence.h"
@@ -60,11 +61,7 @@ void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerO
 }
 
 FaceServices faceServices() {
-  return {faceNamesOf, [](const CacheReader& cache, const FaceNames& names) {
-            std::vector<WantedFaces> wanted;
-            for (const FaceNames::Faces& one : names.faces) wanted.push_back({one.name, one.has_opacities});
-            return gridSurfacesNamed(wanted, names.by, names.opacity_by, cache);
-          }};
+  return {faceNamesOf, facesAtStep};
 }
 
 /// Refuses options that need a cache from the beginning.

@@ -177,6 +177,8 @@ class RemoteViewer::Work {
     screenViewOf(reader.manifest(), state.camera, request.options, data);  // refuses what cannot be drawn
     const PictureMemory memory = memoryFor(picture, state.annotations, limits_.memory_bytes);
     request.options.output_bytes = memory.bytes;
+    request.faces = state.faceNames();
+    request.faces_at = limits_.faces_at;
     request.one_at_a_time = memory.one_at_a_time;
     request.moving = view.moving;
     request.wants_bytes = false;

@@ -32,6 +32,7 @@ struct ViewerLimits {
   uint64_t memory_bytes = 512 << 20;  // for drawing
   double target_s = 0.04;             // to draw a picture while the camera moves
   Backend backend = Backend::kAutomatic;
+  FacesAtStep faces_at = {};  // none: no faces are drawn
 };
 
 /// The address at which a server listens, and what it allows.

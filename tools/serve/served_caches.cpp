@@ -64,10 +64,11 @@ size_t variableOf(const CacheReader& reader, const std::string& name, const std:
 
 }  // namespace
 
-ServedCaches::ServedCaches(const std::vector<fs::path>& paths) {
-  const auto add = [this](std::string name, CacheReader reader) {
+ServedCaches::ServedCaches(const std::vector<fs::path>& paths, const FacesOf& faces) {
+  const auto add = [&](std::string name, CacheReader reader) {
     ViewState first = firstViewOf(reader, "", kFirstSize);
-    caches_.push_back({std::move(name), std::move(reader), std::move(first)});
+    std::vector<std::string> names = faces ? faces(reader) : std::vector<std::string>{};
+    caches_.push_back({std::move(name), std::move(reader), std::move(first), std::move(names)});
   };
   std::vector<std::string> names;
   for (const fs::path& path : paths) {
@@ -122,6 +123,7 @@ std::string ServedCaches::cacheText(const OpenRequest& request) const {
                                {"title", scalarTitle(variable.name, variable.unit)},
                                {"low", variable.min},
                                {"high", variable.max}});
+  json["faces"] = cache.faces;
   json["times"] = Json::array();
   for (const SeriesStep& step : cache.reader.series().steps) json["times"].push_back(step.time);
   json["time_unit"] = cache.reader.seriesManifest().time_unit;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,9 @@ namespace curvisplat {
 class ServedCaches {
  public:
   /// Throws Error as CacheReader; 0.1 to 0.3 s a cache. Requires one path or more.
-  explicit ServedCaches(const std::vector<std::filesystem::path>& paths);
+  /// `faces`: the names of a cache's faces that FrameRequest::faces_at finds; none: pages offer no faces.
+  using FacesOf = std::function<std::vector<std::string>(const CacheReader&)>;
+  explicit ServedCaches(const std::vector<std::filesystem::path>& paths, const FacesOf& faces = {});
 
   size_t size() const { return caches_.size(); }
   const CacheReader& reader(size_t cache) const { return caches_[cache].reader; }
@@ -54,6 +57,7 @@ class ServedCaches {
     std::string name;
     CacheReader reader;
     ViewState first;
+    std::vector<std::string> faces;
   };
   std::vector<Served> caches_;
   mutable Mutex reading_;  // held while a coarse level is read: its memory is not part of a viewer's limit
