@@ -176,6 +176,8 @@ def broken_messages(server):
     base = viewer.facts["state"]
     for text in ("", "[]", "{}", '{"type": 1}', '{"type": "open"}', '{"type": "open", "cache": 99, "size": [1, 1]}', "[" * 5000, '"\\ud800"',
                  '{"type": "view", "number": 1e400}', '{"type": "histogram", "cache": 0, "scalar": "none", "low": 0, "high": 1, "log": false}',
+                 '{"type": "command", "cache": 0, "size": [1, 1], "step": 0, "state": {}}',
+                 json.dumps({"type": "command", "cache": 0, "size": [1, 1], "step": 9, "state": base}),
                  '{"type": "pick"}', '{"type": "pick", "x": 2, "y": 0}', '{"type": "pick", "x": "a", "y": 0}',
                  '{"type": "colours", "map": "../../etc/passwd"}', '{"type": "choose", "cache": 0, "scalar": "/etc/passwd"}'):
         viewer.socket.send(text)
@@ -223,6 +225,13 @@ def broken_messages(server):
                 expect(str(folder) not in json.dumps(message), f"no path in {message}")
                 break
     expect(server.is_alive(), "the server lives after clicks")
+    # A mouse that rests where there is nothing is told so; a command names no folder.
+    viewer.view(base)
+    viewer.picture()
+    viewer.send(type="pick", x=0, y=0, hovers=True)
+    expect(viewer.text("value")["marker"] is None, "there is nothing in the corner")
+    viewer.send(type="command", cache=0, size=[64, 48], step=0, state=base)
+    expect(str(folder) not in json.dumps(viewer.text("command")), "no path in the command")
     # Faces that the grid lacks are refused, those that it has are drawn.
     face = {"colour": [1, 0, 0], "opacity": 1, "by_function": False, "visible": True}
     for name, is_drawn in (("jmin", True), ("../x", False), ("block 9:i=3", False), ("all", True)):

@@ -138,6 +138,8 @@ TEST(ClientMessage, IsReadWithEachType) {
   const auto pick = parsed<PickRequest>(R"({"type": "pick", "x": 0.25, "y": 1})");
   EXPECT_EQ(pick.x, 0.25);
   EXPECT_EQ(pick.y, 1);
+  EXPECT_FALSE(pick.hovers);
+  EXPECT_TRUE(parsed<PickRequest>(R"({"type": "pick", "x": 0, "y": 1, "hovers": true})").hovers);
   EXPECT_THROW(parsed<PickRequest>(R"({"type": "pick", "x": 1.1, "y": 0})"), Error);
   const auto command = parsed<CommandRequest>(
       R"({"type": "command", "cache": 1, "size": [30, 20], "step": 2, "state": {"a": 1}})");
@@ -176,6 +178,7 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
           "high");
   refuses(R"({"type": "histogram", "cache": 0, "scalar": "a", "low": 0, "high": 2, "log": true})", "low");
   refuses(R"({"type": "colours", "map": ")" + std::string(1001, 'a') + R"("})", "map");
+  refuses(R"({"type": "pick", "x": 0, "y": 1, "hovers": 1})", "hovers");
   refuses(R"({"type": "shown", "picture": 1e300})", "picture");
   refuses(R"({"type": "command", "cache": 0, "size": [1, 1], "step": 0, "state": []})", "state");
   refuses(R"({"type": "command", "cache": 0, "size": [1, 1], "step": -1, "state": {}})", "step");

@@ -359,6 +359,19 @@ def markers(tab):
         expect(False, "a click into the data makes a marker")
         return
     marker = tab.run(f"{PAGE}.state.markers[0]")
+    # A mouse that rests there is told the same value; where there is nothing, it is told nothing.
+    shown = "document.getElementById('hover').hidden ? '' : document.getElementById('hover').textContent"
+    tab.mouse("mouseMoved", x + 1, y, button="none")
+    tab.mouse("mouseMoved", x, y, button="none")
+    text = tab.wait(shown, "the value under the mouse")
+    shot(tab, "hover")
+    expect(text.split()[0] == marker["scalar"] and abs(float(text.split()[1]) - marker["value"]) <= 1e-3 * abs(marker["value"]) + 1e-9,
+           f"the value under the mouse: {text}, not {marker['value']}")
+    tab.mouse("mouseMoved", 1275, 795, button="none")
+    expect(tab.run(shown) == "", "the value goes with the mouse")
+    tab.wait("hovered && hovered.answered", "an answer for the corner")
+    expect(tab.run(shown) == "" and len(tab.run(f"{PAGE}.state.markers")) == 1, "there is nothing in the corner")
+    expect(tab.run(f"{PAGE}.errors.length") == 0, "which is no error")
     expect(marker["name"] == "1" and marker["value"] == marker["value"] and len(marker["point"]) == 3, f"a marker: {marker}")
     names = tab.run("[...document.querySelectorAll('.sign, #markers span')].map(e => e.textContent)")
     expect(len(names) == 2 and all(text.startswith(f"1: {marker['scalar']} ") for text in names), f"its texts name its scalar: {names}")

@@ -180,7 +180,10 @@ ClientMessage parseClientMessage(std::string_view text, size_t caches) {
   if (name == "choose") return functionIn(message, caches);
   if (name == "histogram") return histogramIn(message, caches);
   if (name == "colours") return ColoursRequest{nameIn(message, "map")};
-  if (name == "pick") return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1)};
+  if (name == "pick") {
+    const auto hovers = message.find("hovers");
+    return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1), hovers && hovers->flag()};
+  }
   if (name == "command")
     return CommandRequest{cacheIn(message, caches), sizeIn(message), message.at("step").count(0, kMaxNumber),
                           stateIn(message)};

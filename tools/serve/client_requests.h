@@ -20,7 +20,8 @@
 //    "log": false}
 //   {"type": "colours", "map": "viridis"}        asks for a colour map's points
 //   {"type": "pick", "x": 0.4, "y": 0.7}         asks what the picture at rest shows there; x and y are
-//                                                fractions of its sides
+//                                                fractions of its sides; "hovers": true asks for the value
+//                                                under a mouse that rests, which may be nothing
 //   {"type": "command", "cache": 0,              asks for the `render` command of a view
 //    "size": [800, 600], "step": 0, "state": {...}}
 //   {"type": "shown", "picture": 3}              the page has drawn this picture
@@ -100,6 +101,7 @@ struct ColoursRequest {
 };
 struct PickRequest {
   double x = 0, y = 0;  // 0..1, from the upper left corner
+  bool hovers = false;  // nothing there is an answer, not an error
 };
 /// A view, as in ViewRequest.
 struct CommandRequest {

@@ -74,9 +74,9 @@ class RemoteViewer::Work {
     for (const uint64_t picture : inbox.shown) line_.shown(picture, clockSeconds());
     if (inbox.open) answer([&] { return caches_.cacheText(*inbox.open); });
     if (inbox.view) wanted_ = std::move(inbox.view);
-    if (inbox.pick && frames_ && !asked_.empty()) {
+    if (inbox.pick && frames_ && !asked_.empty() && !(inbox.pick->hovers && picked_)) {
       picked_ = inbox.pick;
-      frames_->requestValues();
+      if (!values_) frames_->requestValues();
     }
     woken_ |= inbox.woken;
     advance();
@@ -103,19 +103,21 @@ class RemoteViewer::Work {
 
   /// The sample that is seen at the picked place, once the values of the picture are there. Empty until then.
   std::string pickedText() {
-    const std::optional<ShownValues> values = frames_->takeValues();
-    if (!values) return {};
+    if (auto values = frames_->takeValues()) values_ = std::move(values);
+    if (!values_) return {};
     const PickRequest pick = *std::exchange(picked_, std::nullopt);
     const Asked& asked = asked_.back();
-    if (values->request != asked.request) return {};
+    if (values_->request != asked.request) {
+      values_.reset();
+      return {};
+    }
     const CacheReader& reader = caches_.reader(cache_);
     const glm::dvec2 pixel(pick.x * asked.picture.width, pick.y * asked.picture.height);
-    const auto point = pointSeenAt(*values, reader.manifest(), pixel, asked.data);
-    if (!point) throw UsageError("there is nothing at this place");
-    return caches_.markerText(cache_, {asked.state.variable, values->step}, *point);
+    const auto point = pointSeenAt(*values_, reader.manifest(), pixel, asked.data);
+    return caches_.markerText(cache_, {asked.state.variable, values_->step, pick.hovers}, point);
   }
 
-  /// What is wrong with the request concerns the page alone.
+  /// Turns any error into one of the page: the state that it sent is wrong.
   std::string commandText(const CommandRequest& request) const try {
     return caches_.commandText(request);
   } catch (const Error& error) {
@@ -193,6 +195,7 @@ class RemoteViewer::Work {
       asked_.clear();
     }
     picked_.reset();  // it was of another picture
+    values_.reset();
     const uint64_t number = frames_->request(std::move(request));
     // A page that asks faster than pictures come does not make this grow.
     if (asked_.size() == kMaxAsked) asked_.pop_front();
@@ -292,6 +295,7 @@ class RemoteViewer::Work {
   const ViewerLimits& limits_;
   std::optional<ViewRequest> wanted_;  // waits until the line is open
   std::optional<PickRequest> picked_;  // waits for the picture's values
+  std::optional<ShownValues> values_;  // of the newest request, once they were asked for
   bool woken_ = false;
   size_t cache_ = 0;
   std::string function_text_;
@@ -327,7 +331,8 @@ void RemoteViewer::receive(ClientMessage message) {
     if (auto* const function = std::get_if<FunctionRequest>(&message)) inbox_.function = std::move(*function);
     if (auto* const one = std::get_if<HistogramRequest>(&message)) inbox_.histogram = std::move(*one);
     if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
-    if (auto* const pick = std::get_if<PickRequest>(&message)) inbox_.pick = *pick;
+    if (auto* const pick = std::get_if<PickRequest>(&message))
+      if (!pick->hovers || !inbox_.pick) inbox_.pick = *pick;  // a click is not lost
     if (auto* const command = std::get_if<CommandRequest>(&message)) inbox_.command = std::move(*command);
     if (auto* const shown = std::get_if<ShownReport>(&message))
       if (inbox_.shown.size() < kMaxReports) inbox_.shown.push_back(shown->picture);

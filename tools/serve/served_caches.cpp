@@ -23,17 +23,17 @@ using Json = nlohmann::ordered_json;
 
 constexpr ImageSize kFirstSize{1200, 800};
 constexpr size_t kBins = 128;
-constexpr int kStripColours = 128;
+constexpr int kStripColours = 128, kSwatchColours = 16;
 
 std::string textOf(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 /// Colours along a function's range, as "rrggbb...".
-std::string stripOf(const EditedFunction& function) {
+std::string stripOf(const EditedFunction& function, int colours = kStripColours) {
   std::string strip;
-  for (int n = 0; n < kStripColours; ++n) {
-    const glm::dvec3 colour = 255.0 * function.colourAt(n / (kStripColours - 1.0)) + 0.5;
+  for (int n = 0; n < colours; ++n) {
+    const glm::dvec3 colour = 255.0 * function.colourAt(n / (colours - 1.0)) + 0.5;
     strip += fmt::format("{:02x}{:02x}{:02x}", static_cast<int>(colour.r), static_cast<int>(colour.g),
                          static_cast<int>(colour.b));
   }
@@ -104,7 +104,9 @@ std::string ServedCaches::helloText() const {
   json["caches"] = Json::array();
   for (const Served& cache : caches_) json["caches"].push_back(cache.name);
   json["maps"] = Json::array();
-  for (const PublishedMap& map : builtInMaps()) json["maps"].push_back(map.name);
+  for (const PublishedMap& map : builtInMaps())
+    json["maps"].push_back(
+        {{"name", map.name}, {"strip", stripOf(EditedFunction(map.name, 0, 1, 1), kSwatchColours)}});
   json["most_pixels"] = kMaxPixels;
   json["largest_side"] = kLargestSide;
   return textOf(json);
@@ -157,15 +159,17 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
 }
 
 std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& scalar,
-                                     const glm::dvec3& point) const {
+                                     const std::optional<glm::dvec3>& point) const {
   const Served& cache = caches_[cache_number];
   const size_t variable = variableOf(cache.reader, cache.name, scalar.name);
   const MutexLock lock(reading_);
   const CacheReader reader = cache.reader.atStep(scalar.step);
-  const auto found = probe(reader, {&variable, 1}, point);
-  if (!found) throw UsageError("there is nothing at this place");
+  const auto found = point ? probe(reader, {&variable, 1}, *point) : std::nullopt;
+  const char* const type = scalar.hovers ? "value" : "marker";
+  if (!found && !scalar.hovers) throw UsageError("there is nothing at this place");
+  if (!found) return textOf({{"type", type}, {"cache", cache_number}, {"marker", nullptr}});
   // As ViewState's JSON has markers, without a name.
-  const Json marker = {{"point", jsonOf(point)},
+  const Json marker = {{"point", jsonOf(*point)},
                        {"scalar", scalar.name},
                        {"unit", reader.manifest().variables[variable].unit},
                        {"value", found->variables.at(0).value},
@@ -173,7 +177,7 @@ std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& sc
                        {"i", found->i},
                        {"j", found->j},
                        {"k", found->k}};
-  return textOf({{"type", "marker"}, {"cache", cache_number}, {"marker", marker}});
+  return textOf({{"type", type}, {"cache", cache_number}, {"marker", marker}});
 }
 
 std::string ServedCaches::coloursText(const ColoursRequest& request) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,12 +39,15 @@ class ServedCaches {
   /// Throw UsageError for a scalar or map that does not exist, Error as reading does.
   std::string functionText(const FunctionRequest& request) const;
   std::string histogramText(const HistogramRequest& request) const;
-  /// The values of the data at a point, of a scalar at a step. UsageError outside of the data.
+  /// The value of a scalar at a step, at a point of the picture if there is one: a "marker", which is UsageError outside
+  /// of the data; or for a mouse that rests a "value", which is null there.
   struct MarkedScalar {
     std::string name;
     uint64_t step = 0;
+    bool hovers = false;
   };
-  std::string markerText(size_t cache, const MarkedScalar& scalar, const glm::dvec3& point) const;
+  std::string markerText(size_t cache, const MarkedScalar& scalar,
+                         const std::optional<glm::dvec3>& point) const;
   static std::string coloursText(const ColoursRequest& request);
   /// The `curvisplat render` command that draws a view, for a folder that has the cache, and the files of functions that its
   /// options cannot state. Throws Error for a state that is not one of this cache.
