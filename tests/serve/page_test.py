@@ -180,6 +180,23 @@ def navigation(browser, server, caches):
     return tab
 
 
+def choose_map(tab, name):
+    tab.run(f"document.querySelector('#maps [title={name}]').click()")
+
+
+def numbers(tab):
+    """What stands below the curve, in the function's own scale."""
+    for low, high, log, expected in ((-2, 6, False, ["-2", "0", "2", "4", "6"]), (0.01, 100, True, ["0.01", "0.1", "1", "10", "100"]),
+                                     (101325, 101327, False, ["101325", "101325.5", "101326", "101326.5", "101327"]),
+                                     (-3e-9, 1e-9, False, ["-3e-9", "-2e-9", "-1e-9", "0", "1e-9"])):
+        tab.run(f"setRange({low}, {high}, {'true' if log else 'false'})")
+        shown = tab.run("[0, 0.25, 0.5, 0.75, 1].map(numberAt)")
+        expect(shown == expected, f"{low} to {high}: {shown}")
+        tab.run("setRange(0.5, 1, false)")
+    tab.run("document.getElementById('automatic').click()")
+    tab.wait(f"{PAGE}.state.preset === 'automatic'", "the automatic function")
+
+
 def editing(tab):
     rest(tab)
     x, y = tab.place("#curve")
@@ -189,7 +206,15 @@ def editing(tab):
     changes(tab, lambda: tab.run(f"""document.getElementById('curve').dispatchEvent(new MouseEvent('dblclick',
       {{clientX: {x - 40}, clientY: {y - 50}, bubbles: true}}))"""), "removing a point")
     expect(tab.run(f"{PAGE}.state.function.Points.length") == points, "a double-click removes it")
-    changes(tab, lambda: set_value(tab, "#map", "magma"), "other colours", "colours")
+    tab.click("#map")
+    tab.wait("!document.getElementById('maps').hidden", "the colour maps")
+    shot(tab, "maps")
+    bands = tab.run("[...document.querySelectorAll('#maps i')].map(i => i.style.background)")
+    expect(len(bands) > 60 and len(set(bands)) > 0.9 * len(bands), f"maps are told by their colours: {len(bands)}, {len(set(bands))}")
+    expect("rgb(68, 1, 84)" in tab.run("document.querySelector('#maps [title=viridis] i').style.background"), "viridis begins with its violet")
+    changes(tab, lambda: choose_map(tab, "magma"), "other colours", "colours")
+    expect(tab.run("document.getElementById('maps').hidden && document.getElementById('map').textContent") == "magma", "its name is shown")
+    numbers(tab)
     changes(tab, lambda: set_value(tab, "#high", "0.8"), "another range")
     changes(tab, lambda: set_value(tab, "#unit", "0.5"), "another opacity unit")
     changes(tab, lambda: tab.click("#automatic"), "the automatic function")
@@ -319,8 +344,8 @@ def shared_address(browser, server, tab):
     tab.run("document.getElementById('cache').value = 1; document.getElementById('cache').onchange()")
     tab.wait("!document.getElementById('time').hidden", "the series")
     set_value(tab, "#step", "2")
-    set_value(tab, "#map", "magma")
-    tab.wait("document.getElementById('map').value !== 'magma' || strip.startsWith('000003')", "the colours")
+    choose_map(tab, "magma")
+    tab.wait("document.getElementById('map').textContent === 'magma'", "the colours")
     tab.drag(MIDDLE, (850, 430), steps=5)
     before = rest(tab)
     tab.run("document.getElementById('copy-address').click()")
