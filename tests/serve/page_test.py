@@ -217,6 +217,19 @@ def editing(tab):
     numbers(tab)
     changes(tab, lambda: set_value(tab, "#high", "0.8"), "another range")
     changes(tab, lambda: set_value(tab, "#unit", "0.5"), "another opacity unit")
+    for name, opacities in (("ramp", [0, 1]), ("clear", [0, 0]), ("band", [0, 0, 0.5, 0, 0])):
+        changes(tab, lambda name=name: tab.click(f"#{name}"), f"the button {name}", name)
+        found = tab.run(f"{PAGE}.state.function.Points")
+        low, high = tab.run("range()")
+        expect(found[1::4] == opacities, f"{name}: {found}")
+        expect([found[0], found[-4]] == [low, high], f"{name} is of the range {low} to {high}: {found}")
+    # The density is a hundredth of the data's diagonal over the opacity unit, logarithmic.
+    changes(tab, lambda: set_value(tab, "#density", "1"), "the density")
+    diagonal = tab.run("Math.hypot(...cache.upper.map((v, i) => v - cache.lower[i]))")
+    unit = tab.run(f"{PAGE}.state.function.ScalarOpacityUnitDistance")
+    expect(abs(unit / (diagonal / 1000) - 1) < 0.01, f"a density of 10 is a unit of {diagonal / 1000}: {unit}")
+    changes(tab, lambda: set_value(tab, "#unit", repr(diagonal / 100)), "the opacity unit")
+    expect(abs(float(tab.run("document.getElementById('density').value"))) < 0.011, "the density follows the unit")
     changes(tab, lambda: tab.click("#automatic"), "the automatic function")
     for name in ("scalar_bar", "axes", "axes_grid", "outline", "dark", "lit"):
         changes(tab, lambda name=name: tab.click(f"#{name}"), name)
