@@ -180,6 +180,33 @@ def navigation(browser, server, caches):
     return tab
 
 
+def press(tab, selector):
+    tab.run(f"document.querySelector('{selector}').click()")
+
+
+def objects(tab):
+    """Faces and isosurfaces are added, hidden, moved and removed."""
+    before = rest(tab)
+    expect(tab.run("[...document.getElementById('add-face').options].map(o => o.value).includes('jmin')"), "the grid's faces are offered")
+    changes(tab, lambda: set_value(tab, "#add-face", "jmin"), "a face of the grid", "face")
+    changes(tab, lambda: set_value(tab, "#faces input[type=color]", "#ff0000"), "its colour")
+    changes(tab, lambda: set_value(tab, "#faces input[type=range]", "0.3"), "its opacity")
+    changes(tab, lambda: press(tab, "#faces .eye"), "its eye")
+    expect(rest(tab) == before, "a hidden face is not drawn")
+    press(tab, "#faces button:last-of-type")
+    changes(tab, lambda: press(tab, "#add-iso"), "an isosurface", "isosurface")
+    low, high = tab.run("range()")
+    value = tab.run(f"{PAGE}.state.isosurfaces[0].value")
+    expect(abs(value - (low + high) / 2) < 1e-6 * (high - low), f"it begins in the middle of {low} to {high}: {value}")
+    changes(tab, lambda: set_value(tab, "#isosurfaces input[type=number]", repr(low + 0.3 * (high - low))), "its value")
+    changes(tab, lambda: press(tab, "#volume"), "the isosurface alone", "isosurface_alone")
+    copied = tab.run(f"{PAGE}.state.isosurfaces")
+    expect(len(copied) == 1 and copied[0]["visible"], f"one isosurface: {copied}")
+    press(tab, "#volume")
+    changes(tab, lambda: press(tab, "#isosurfaces button:last-of-type"), "no isosurface")
+    expect(rest(tab) == before, "the picture is the one before")
+
+
 def choose_map(tab, name):
     tab.run(f"document.querySelector('#maps [title={name}]').click()")
 
@@ -243,9 +270,13 @@ def editing(tab):
     changes(tab, lambda: tab.click("#add-clip"), "a clip plane")
     changes(tab, lambda: set_value(tab, "#clip_planes input", "0.3"), "moving the plane")
     changes(tab, lambda: tab.run("document.querySelector('#clip_planes button:last-of-type').click()"), "removing the plane")
-    changes(tab, lambda: (tab.click("#add-slice"), set_value(tab, "#volume", "off")), "a slice", "slice")
-    tab.run("document.querySelector('#slices button:last-of-type').click()")
-    set_value(tab, "#volume", "on")
+    changes(tab, lambda: (tab.click("#add-slice"), press(tab, "#volume")), "a slice", "slice")
+    changes(tab, lambda: press(tab, "#slices .eye"), "the slice's eye")
+    expect(tab.run("document.getElementById('volume').disabled"), "the volume cannot be hidden where nothing else is drawn")
+    press(tab, "#slices .eye")
+    press(tab, "#volume")
+    press(tab, "#slices button:last-of-type")
+    objects(tab)
     rest(tab)
     expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
 
