@@ -92,17 +92,26 @@ def differing_from(tab, file, by=0):
       let n = 0; for (let k = 0; k < a.length; ++k) n += Math.abs(a[k] - b[k]) > {by}; return n; }})()""")
 
 
-def copies_the_command(tab, caches):
-    """The command that the page shows draws its picture, in the folder of the cache."""
+def copies_the_command(tab, caches, edited):
+    """The command that the page shows draws its picture, in the folder of the cache; an edited function is in a file."""
+    if edited:
+        before = rest(tab)
+        tab.run("setPoints([[0, 0.2], [0.3, 0.9], [1, 0.1]].map(([u, opacity]) => ({ u, opacity, midpoint: 0.25, sharpness: 0.5 }))); changed()")
+        wait_for(lambda: rest(tab) != before, "an edited function")
     rest(tab)
     tab.run("document.getElementById('copied-title').textContent = ''; document.getElementById('copy-command').click()")
     tab.wait("document.getElementById('copied').open", "the command")
     text = tab.run("document.getElementById('copied-text').value")
     files = tab.run("[...document.querySelectorAll('#copied-files button')].map(b => b.textContent)")
     shot(tab, "command")
+    tab.run("download = async (blob, name) => { window.saved = [name, await blob.text()]; }")
+    for n in range(len(files)):
+        tab.run(f"window.saved = null; document.querySelectorAll('#copied-files button')[{n}].click()")
+        name, content = tab.wait("window.saved", "the function's file")
+        (pathlib.Path(caches[0]).parent / name).write_text(content)
     tab.run("document.getElementById('copied').close()")
     expect("/" not in text.split()[2], f"the command names no folder of the server: {text}")
-    expect(files == [], f"this function needs no file: {files}")
+    expect(len(files) == (1 if edited else 0), f"files of functions: {files}")
     words = shlex.split(text)
     expect(words[:2] == ["curvisplat", "render"], text)
     subprocess.run([program, *words[1:]], cwd=pathlib.Path(caches[0]).parent, check=True, capture_output=True)
@@ -479,6 +488,23 @@ def two_scalars(tab):
     expect(tab.run(f"{PAGE}.state.function.Points") == own, "the colours' function is as it was")
     changes(tab, lambda: set_value(tab, "#opacity_by", ""), "the same scalar again")
     expect(tab.run(f"{PAGE}.state.opacity_by") is None, "one scalar again")
+    # Another scalar's function is chosen from its own values, also after this one's was edited; the colours stay.
+    first = tab.run(f"{PAGE}.state.variable")
+    automatic = {}
+    for name in (names[1], first):
+        changes(tab, lambda name=name: set_value(tab, "#scalar", name), f"the scalar {name}")
+        automatic[name] = tab.run(f"{PAGE}.state.function")
+    press(tab, "#band")
+    set_value(tab, "#unit", "1e-6")
+    choose_map(tab, "magma")
+    tab.wait("document.getElementById('map').textContent === 'magma'", "the colours")
+    changes(tab, lambda: set_value(tab, "#scalar", names[1]), "another scalar after an edit", "another_scalar")
+    tab.wait("document.getElementById('map').textContent === 'magma'", "the colours again")
+    found = tab.run(f"{PAGE}.state.function")
+    expect(found["Points"] == automatic[names[1]]["Points"] and found["ScalarOpacityUnitDistance"] == automatic[names[1]]["ScalarOpacityUnitDistance"],
+           "an edited function is chosen anew for another scalar")
+    press(tab, "#automatic")
+    changes(tab, lambda: set_value(tab, "#scalar", first), "the first scalar")
     # A marker keeps the scalar that it was set in.
     tab.key("z")
     rest(tab)
@@ -619,7 +645,9 @@ with tempfile.TemporaryDirectory() as folder:
             print("navigation done")
             editing(tab)
             print("editing done")
-            copies_the_command(tab, caches)
+            copies_the_command(tab, caches, edited=False)
+            copies_the_command(tab, caches, edited=True)
+            tab.click("#automatic")
             print("command done")
             markers(tab)
             print("markers done")
