@@ -1,11 +1,17 @@
-// Draws a sheet of quads as the layers of a picture of 600x600. Items are quads.
+// Draws a sheet of quads, or lines, as the layers of a picture of 600x600. Items are quads, or segments.
 #include <benchmark/benchmark.h>
 #include <tbb/task_arena.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <memory>
+#include <numbers>
+#include <random>
+#include <utility>
+#include <vector>
 
 #include "render/camera/camera.h"
+#include "render/mesh/curve_set.h"
 #include "render/surface/scene_layers.h"
 
 namespace curvisplat {
@@ -52,6 +58,55 @@ void sheet(benchmark::State& state) {
 BENCHMARK(sheet)
     ->ArgNames({"side", "threads", "perspective"})
     ->ArgsProduct({{64, 256, 1024}, {1, 2}, {0, 1}})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
+
+/// Helices of a thousand segments, three pixels wide, in [0, 1]³.
+std::shared_ptr<SurfaceScene> linesOf(size_t lines) {
+  constexpr int kSegments = 1000;
+  std::mt19937 random(3);
+  const auto any = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  std::vector<glm::dvec3> points;
+  std::vector<uint32_t> begins{0};
+  std::vector<float> values;
+  for (size_t line = 0; line < lines; ++line) {
+    const glm::dvec3 middle(any(), any(), any());
+    const glm::dvec3 way = glm::normalize(glm::dvec3(any() - 0.5, any() - 0.5, any() - 0.5));
+    const double radius = 0.02 + 0.05 * any(), turns = 2 + 6 * any();
+    for (int n = 0; n <= kSegments; ++n) {
+      const double part = static_cast<double>(n) / kSegments, angle = 2 * std::numbers::pi * turns * part;
+      points.push_back(middle + 0.8 * (part - 0.5) * way +
+                       radius * glm::dvec3(std::cos(angle), std::sin(angle), std::sin(angle + 1)));
+      values.push_back(static_cast<float>(part));
+    }
+    begins.push_back(static_cast<uint32_t>(points.size()));
+  }
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->curves.emplace_back().set =
+      std::make_shared<CurveSet>(curveSetOf(points, std::move(begins), std::move(values)));
+  return scene;
+}
+
+void lines(benchmark::State& state) {
+  const auto scene = linesOf(static_cast<size_t>(state.range(0)));
+  Camera camera;
+  camera.focal_point = {0.5, 0.5, 0.5};
+  camera.position = {1.9, -1.4, 1.6};
+  camera.parallel_scale = 0.6;
+  const ScreenView view = ScreenView::of(camera, kSize, glm::dvec3(1.0), kLowPass, 1e-3);
+  const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
+  const SceneLook look{colours, {}, {}, 0};
+  tbb::task_arena arena(static_cast<int>(state.range(1)));
+  arena.execute([&] {
+    ScreenVertices memory;
+    for (auto _ : state) benchmark::DoNotOptimize(layersOf(*scene, view, {}, look, &memory));
+  });
+  state.SetItemsProcessed(1000 * state.range(0) * static_cast<int64_t>(state.iterations()));
+}
+BENCHMARK(lines)
+    ->ArgNames({"lines", "threads"})
+    ->ArgsProduct({{10, 100, 1000}, {1, 2}})
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime()
     ->UseRealTime();

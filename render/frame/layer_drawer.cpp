@@ -9,7 +9,7 @@
 
 #include "render/frame/frame_workers.h"
 #include "render/image/too_little_memory.h"
-#include "render/surface/curve_meshes.h"
+#include "render/mesh/curve_set.h"
 #include "render/surface/scene_layers.h"
 #include "render/surface/slice_sampler.h"
 #include "stream/base/compute_permits.h"
@@ -54,14 +54,15 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) {
       std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent) ||
       std::any_of(options.scene->curves.begin(), options.scene->curves.end(),
                   [](const Curves& curves) { return curves.opacity < 1; });
-  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8;
+  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8,
+                     kPointBytes = 28;
   uint64_t bytes =
       kSampleTileBytes * (peels ? PixelLayers::kMaxLayers : 1) * threadsOrCores(options.threads) +
       options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
              kTriangleBytes * surface.mesh->triangles.size();
-  bytes += curveBytes(*options.scene);
+  for (const Curves& curves : options.scene->curves) bytes += kPointBytes * curves.set->positions.size();
   if (!options.scene->isovalues.empty())
     bytes += isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels();
   if (!options.scene->grid_surfaces.empty())
@@ -114,8 +115,7 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
                        throw_if_stopped};
   std::shared_ptr<const PixelLayers> layers;
   runOnThreadsOf(options, [&] {
-    SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
-    for (Surface& surface : curveSurfaces(scene, view)) scene.surfaces.push_back(std::move(surface));
+    const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
     layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, &surface_memory_));
   });
   planner_.addLayers(plan, std::move(layers), options);

@@ -10,7 +10,8 @@ namespace {
 constexpr int kGrid = 16;  // to a pixel
 // Pixels: triangles that reach beyond are clipped there, so that double is exact.
 constexpr float kGuard = 1e5f;
-constexpr size_t kLeftAtOnce = 1024;
+constexpr size_t kAtOnce = 1024;
+constexpr uint32_t kReach = 16;  // capsules of a line that may lie in one another
 
 /// To even where it lies between two. (Without SSE4 the library's function is a call.)
 int nearestWhole(float value) {
@@ -44,41 +45,26 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
   y1_ = std::min(y0_ + kSampleTileHeight, triangles.view().size.height) - 1;
   before_ = before;
   bool cleared = false;
-  std::array<uint32_t, kLeftAtOnce> numbers, left;
+  std::array<uint32_t, kAtOnce> numbers;
   const bool any = bins.forTile(column, row, [&](size_t surface, std::span<const TriangleRun> seen) {
     if (!std::exchange(cleared, true)) {
       PixelSamples nothing;
       nothing.values.fill(INFINITY);
       nothing.numbers.fill(PixelSamples::kNothing);
       std::fill(samples_.begin(), samples_.end(), nothing);
+      depths_.clear();
     }
-    const TriangleMesh& mesh = *triangles.scene().surfaces[surface].mesh;
-    const std::vector<ScreenVertex>& vertices = triangles.verticesOf(surface);
     size_t taken = 0;
     const auto drawTaken = [&] {
       if (throw_if_stopped) throw_if_stopped();
-      const size_t count = drawSmallTriangles(
-          {vertices.data(), mesh.triangles.data(), std::span(numbers).first(std::exchange(taken, 0)),
-           triangles.firstOf(surface)},
-          {samples_.data(), before ? before->samples_.data() : nullptr, x0_, y0_, x1_, y1_}, left.data());
-      for (size_t n = 0; n < count; ++n) {
-        const auto& corners = mesh.triangles[left[n]];
-        const uint32_t number = triangles.firstOf(surface) + left[n];
-        const std::array<ScreenVertex, 3> at{vertices[corners[0]], vertices[corners[1]],
-                                             vertices[corners[2]]};
-        if (!std::isnan(at[0].value + at[1].value + at[2].value)) {
-          drawTriangle(at, number);
-          continue;
-        }
-        const NearPolygon polygon = triangles.behindNear(surface, corners);
-        for (size_t v = 2; v < polygon.count; ++v)
-          drawTriangle({polygon.vertices[0], polygon.vertices[v - 1], polygon.vertices[v]}, number);
-      }
+      const std::span<const uint32_t> of_surface = std::span(numbers).first(std::exchange(taken, 0));
+      triangles.isCurve(surface) ? drawCurve(triangles, surface, of_surface)
+                                 : drawSurface(triangles, surface, of_surface);
     };
     for (const TriangleRun& run : seen)
       for (uint32_t n = 0; n < run.count; ++n) {
         numbers[taken++] = run.first + n;
-        if (taken == kLeftAtOnce) drawTaken();
+        if (taken == kAtOnce) drawTaken();
       }
     if (taken > 0) drawTaken();
   });
@@ -87,6 +73,48 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
            return std::any_of(pixel.numbers.begin(), pixel.numbers.end(),
                               [](uint32_t number) { return number != PixelSamples::kNothing; });
          }));
+}
+
+SampleBox SampleTile::box() {
+  return {samples_.data(), before_ ? before_->samples_.data() : nullptr, x0_, y0_, x1_, y1_};
+}
+
+void SampleTile::drawSurface(const SceneTriangles& triangles, size_t surface,
+                             std::span<const uint32_t> numbers) {
+  const TriangleMesh& mesh = *triangles.scene().surfaces[surface].mesh;
+  const std::vector<ScreenVertex>& vertices = triangles.verticesOf(surface);
+  std::array<uint32_t, kAtOnce> left;
+  const size_t count = drawSmallTriangles(
+      {vertices.data(), mesh.triangles.data(), numbers, triangles.firstOf(surface)}, box(), left.data());
+  for (size_t n = 0; n < count; ++n) {
+    const auto& corners = mesh.triangles[left[n]];
+    const uint32_t number = triangles.firstOf(surface) + left[n];
+    const std::array<ScreenVertex, 3> at{vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]};
+    if (!std::isnan(at[0].value + at[1].value + at[2].value)) {
+      drawTriangle(at, number);
+      continue;
+    }
+    const NearPolygon polygon = triangles.behindNear(surface, corners);
+    for (size_t v = 2; v < polygon.count; ++v)
+      drawTriangle({polygon.vertices[0], polygon.vertices[v - 1], polygon.vertices[v]}, number);
+  }
+}
+
+void SampleTile::drawCurve(const SceneTriangles& triangles, size_t curve, std::span<const uint32_t> points) {
+  std::array<Capsule, kAtOnce> capsules;
+  std::array<uint32_t, kAtOnce> numbers, reaches;
+  size_t count = 0;
+  for (const uint32_t point : points) {
+    const uint32_t begin = triangles.beginOf(curve, point);
+    if (begin == SceneTriangles::kNoCapsule) continue;
+    const Capsule capsule = triangles.capsuleOf(curve, point);
+    if (std::isnan(capsule.a.value + capsule.b.value)) continue;
+    capsules[count] = capsule;
+    numbers[count] = triangles.firstOf(curve) + point;
+    reaches[count++] = kReach * (point - begin + 1);
+  }
+  drawCapsules({std::span(capsules).first(count), numbers.data(), reaches.data(), depths_},
+               triangles.lookOf(curve), box());
 }
 
 /// Coordinates in 1/16 pixel.

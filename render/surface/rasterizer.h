@@ -1,4 +1,4 @@
-// Finds which triangle is seen at each of a pixel's samples, tile by tile.
+// Finds which triangle or capsule is seen at each of a pixel's samples, tile by tile.
 //
 // Vertices are moved to a grid of 1/16 pixel, in which edge functions are exact, in float for small
 // triangles and in double for others: triangles that share an edge leave no gap and share no sample. Eight
@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -19,12 +20,31 @@
 
 namespace curvisplat {
 
+/// Pixels [x0, x1] x [y0, y1] of the picture, with rows of kSampleTileWidth.
+struct SampleBox {
+  PixelSamples* samples;
+  const PixelSamples* before;  // only what lies behind these is drawn; may be null
+  int x0, y0, x1, y1;
+};
+
+/// The farthest values in blocks of pixels of a tile, or more: what lies behind all of a block is not drawn there.
+struct TileDepths {
+  static constexpr int kSide = 8, kColumns = kSampleTileWidth / kSide, kRows = kSampleTileHeight / kSide;
+  std::array<float, size_t{kColumns} * kRows> farthest;
+  std::array<int, size_t{kColumns} * kRows> stale;  // pixels that were drawn since it was found
+
+  void clear() {
+    farthest.fill(INFINITY);
+    stale.fill(0);
+  }
+};
+
 /// The samples of one tile: 256 KiB, to be used for many. One thread at a time.
 class SampleTile {
  public:
   SampleTile() : samples_(static_cast<size_t>(kSampleTileWidth) * kSampleTileHeight) {}
 
-  /// Draws the triangles that a tile sees; with `before`, of the same tile, those that lie behind what its
+  /// Draws the triangles and capsules that a tile sees; with `before`, of the same tile, those that lie behind what its
   /// samples see. False if nothing is seen: then samples are undefined. `throw_if_stopped`: called every thousand
   /// triangles, each of which may cover the tile.
   bool draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row,
@@ -41,13 +61,17 @@ class SampleTile {
 
  private:
   struct Setup;
+  void drawSurface(const SceneTriangles& triangles, size_t surface, std::span<const uint32_t> numbers);
+  void drawCurve(const SceneTriangles& triangles, size_t curve, std::span<const uint32_t> points);
+  SampleBox box();
   void drawTriangle(const std::array<ScreenVertex, 3>& corners, uint32_t number);
   void drawGuarded(const std::array<ScreenVertex, 3>& corners, uint32_t number);
   void fill(const Setup& setup, uint32_t number);
 
   int x0_ = 0, y0_ = 0, x1_ = -1, y1_ = -1;
   const SampleTile* before_ = nullptr;  // while it draws
-  std::vector<PixelSamples> samples_;   // [kSampleTileHeight][kSampleTileWidth]
+  TileDepths depths_;
+  std::vector<PixelSamples> samples_;  // [kSampleTileHeight][kSampleTileWidth]
 };
 
 /// The most pixels along a side of a small triangle: products of a small triangle's differences have fewer
@@ -62,15 +86,20 @@ struct SmallTriangles {
   uint32_t first_number = 0;          // of triangle 0, in the scene
 };
 
-/// Pixels [x0, x1] x [y0, y1] of the picture, with rows of kSampleTileWidth.
-struct SampleBox {
-  PixelSamples* samples;
-  const PixelSamples* before;  // only what lies behind these is drawn; may be null
-  int x0, y0, x1, y1;
-};
-
 /// Draws the small ones into the samples of a tile. Writes the others to `left` ([numbers]), and returns how
 /// many they are. Pure but for what it writes; any thread.
 size_t drawSmallTriangles(const SmallTriangles& work, const SampleBox& box, uint32_t* left);
+
+/// Capsules of one curve, those to draw.
+struct CapsuleWork {
+  std::span<const Capsule> capsules;
+  const uint32_t* numbers;  // [capsules], in the scene
+  // [capsules]: with SampleBox::before, what lies in a capsule of a number that differs by no more, is the
+  // inside of the same line.
+  const uint32_t* reaches;
+  TileDepths& depths;  // of the tile; kept up to date
+};
+/// Draws them, to the same bits in all instruction sets. Pure but for what it writes; any thread.
+void drawCapsules(const CapsuleWork& work, const CapsuleLook& look, const SampleBox& box);
 
 }  // namespace curvisplat

@@ -92,11 +92,14 @@ constexpr double kSteepest = 4, kNear = 0.25;
 constexpr size_t kMaxShaded = 3;  // of a pixel and layer: triangles that do not meet
 constexpr float kSmooth = 0.97f;  // of the cosine between normals: what is in a pixel is lit once
 
+bool hasTranslucentSheet(const SceneTriangles& triangles) {
+  for (size_t n = 0; n < triangles.sheets(); ++n)
+    if (!triangles.isOpaque(n)) return true;
+  return false;
+}
+
 SampledLayers::SampledLayers(const SceneTriangles& triangles, const SurfaceShader& shader)
-    : triangles_(triangles),
-      shader_(shader),
-      has_translucent_(std::any_of(triangles.scene().surfaces.begin(), triangles.scene().surfaces.end(),
-                                   [](const Surface& surface) { return !surface.opacity.opaque(); })) {}
+    : triangles_(triangles), shader_(shader), has_translucent_(hasTranslucentSheet(triangles)) {}
 
 void SampledLayers::clear() {
   spots_.clear();

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "render/mesh/curve_set.h"
+#include "render/surface/capsule.h"
 #include "stream/base/memory.h"
 
 namespace curvisplat {
@@ -20,31 +22,49 @@ constexpr uint32_t kTrianglesAtOnce = 4096;
 SceneTriangles::SceneTriangles(const SurfaceScene& scene, const ScreenView& view, double depth_origin,
                                ScreenVertices memory)
     : scene_(scene), view_(view), depth_origin_(depth_origin), begins_{0}, vertices_(std::move(memory)) {
-  vertices_.resize(scene.surfaces.size());
-  for (size_t n = 0; n < scene.surfaces.size(); ++n) {
-    const TriangleMesh& mesh = *scene.surfaces[n].mesh;
-    begins_.push_back(begins_.back() + static_cast<uint32_t>(mesh.triangles.size()));
+  const size_t sheets = scene.surfaces.size() + scene.curves.size();
+  vertices_.resize(sheets);
+  for (size_t n = 0; n < sheets; ++n) {
+    const std::vector<glm::vec3>& positions = positionsOf(n);
+    const size_t count = isCurve(n) ? positions.size() : scene.surfaces[n].mesh->triangles.size();
+    begins_.push_back(begins_.back() + static_cast<uint32_t>(count));
     std::vector<ScreenVertex>& out = vertices_[n];
-    if (out.capacity() > mesh.positions.size() / 3 * 4 + 1) out = {};  // kept for what needs about as much
-    if (out.capacity() < mesh.positions.size()) {
+    if (out.capacity() > positions.size() / 3 * 4 + 1) out = {};  // kept for what needs about as much
+    if (out.capacity() < positions.size()) {
       out = {};
-      out.reserve(mesh.positions.size());
+      out.reserve(positions.size());
       preferHugePages(out.data(), out.capacity() * sizeof(ScreenVertex));
     }
-    out.resize(mesh.positions.size());
-    projectAll(mesh, out);
+    out.resize(positions.size());
+    projectAll(originOf(n), positions, out);
+    if (!isCurve(n)) continue;
+    looks_.push_back(makeLook(curvesOf(n)));
+    capsule_begins_.push_back(capsuleBegins(n));
   }
 }
 
-/// Affine in the mesh's positions, and the perspective divide.
-void SceneTriangles::projectAll(const TriangleMesh& mesh, std::vector<ScreenVertex>& out) const {
+const glm::dvec3& SceneTriangles::originOf(size_t surface) const {
+  return isCurve(surface) ? curvesOf(surface).set->origin : scene_.surfaces[surface].mesh->origin;
+}
+
+const std::vector<glm::vec3>& SceneTriangles::positionsOf(size_t surface) const {
+  return isCurve(surface) ? curvesOf(surface).set->positions : scene_.surfaces[surface].mesh->positions;
+}
+
+bool SceneTriangles::isOpaque(size_t surface) const {
+  return isCurve(surface) ? curvesOf(surface).opacity >= 1 : scene_.surfaces[surface].opacity.opaque();
+}
+
+/// Affine in the positions, and the perspective divide.
+void SceneTriangles::projectAll(const glm::dvec3& of_positions, const std::vector<glm::vec3>& positions,
+                                std::vector<ScreenVertex>& out) const {
   const bool perspective = view_.projection == Projection::kPerspective;
-  const glm::dvec3 origin = view_.viewFromData(mesh.origin);
+  const glm::dvec3 origin = view_.viewFromData(of_positions);
   const glm::dvec3 right = view_.right * view_.scale, down = view_.down * view_.scale,
                    forward = view_.forward * view_.scale;
   tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kVerticesAtOnce), [&](const auto& range) {
     const auto inView = [&](size_t n) {
-      const double x = mesh.positions[n].x, y = mesh.positions[n].y, z = mesh.positions[n].z;
+      const double x = positions[n].x, y = positions[n].y, z = positions[n].z;
       return glm::dvec3(origin.x + (right.x * x + right.y * y + right.z * z),
                         origin.y + (down.x * x + down.y * y + down.z * z),
                         origin.z + (forward.x * x + forward.y * y + forward.z * z));
@@ -66,8 +86,7 @@ void SceneTriangles::projectAll(const TriangleMesh& mesh, std::vector<ScreenVert
 }
 
 glm::dvec3 SceneTriangles::inView(size_t surface, uint32_t vertex) const {
-  const TriangleMesh& mesh = *scene_.surfaces[surface].mesh;
-  return view_.viewFromData(mesh.origin + glm::dvec3(mesh.positions[vertex]));
+  return view_.viewFromData(originOf(surface) + glm::dvec3(positionsOf(surface)[vertex]));
 }
 
 ScreenVertex SceneTriangles::project(const glm::dvec3& in_view) const {
@@ -110,12 +129,54 @@ SceneTriangles::Place SceneTriangles::placeOfSeveral(uint32_t number) const {
   return {surface, number - begins_[surface]};
 }
 
+/// The pieces of a batch, one triangle or capsule after the other.
+class TriangleBins::Pieces {
+ public:
+  explicit Pieces(const TriangleBins& bins) : bins_(bins) {}
+
+  /// Adds the one of a number, unless its box lies outside of the picture.
+  void add(uint32_t number, float x0, float y0, float x1, float y1) {
+    if (x0 >= left_ && x1 < right_ && y0 >= top_ && y1 < bottom_ && end_ == number) {
+      ++pieces_.back().run.count;
+      ++end_;
+      return;
+    }
+    const TileBox box = bins_.tilesOf(x0, y0, x1, y1);
+    if (box.empty()) return;
+    if (end_ == number && !pieces_.empty() && pieces_.back().box == box) {
+      ++pieces_.back().run.count;
+    } else {
+      pieces_.push_back({box, {number, 1}});
+      const bool one = box.x0 == box.x1 && box.y0 == box.y1;
+      left_ = static_cast<float>(box.x0 * kSampleTileWidth);
+      top_ = static_cast<float>(box.y0 * kSampleTileHeight);
+      right_ = one ? static_cast<float>(std::min((box.x0 + 1) * kSampleTileWidth, bins_.size_.width)) : left_;
+      bottom_ = static_cast<float>(std::min((box.y0 + 1) * kSampleTileHeight, bins_.size_.height));
+    }
+    end_ = number + 1;
+  }
+  /// Adds to the last piece what is not drawn, so that the piece goes on after it.
+  void skip(uint32_t number) {
+    if (end_ != number || pieces_.empty()) return;
+    ++pieces_.back().run.count;
+    ++end_;
+  }
+  const std::vector<Piece>& all() const { return pieces_; }
+
+ private:
+  const TriangleBins& bins_;
+  std::vector<Piece> pieces_;
+  // The last piece's tile in pixels, where it is one tile: most triangles lie in their predecessor's.
+  float left_ = 0, top_ = 0, right_ = 0, bottom_ = 0;
+  uint32_t end_ = 0;  // of the last piece
+};
+
 TriangleBins::TriangleBins(const SceneTriangles& triangles)
     : columns_((triangles.view().size.width + kSampleTileWidth - 1) / kSampleTileWidth),
       rows_((triangles.view().size.height + kSampleTileHeight - 1) / kSampleTileHeight),
       size_(triangles.view().size) {
-  for (size_t surface = 0; surface < triangles.scene().surfaces.size(); ++surface) {
-    const auto count = static_cast<uint32_t>(triangles.scene().surfaces[surface].mesh->triangles.size());
+  for (size_t surface = 0; surface < triangles.sheets(); ++surface) {
+    const uint32_t count = triangles.firstOf(surface + 1) - triangles.firstOf(surface);
     for (uint32_t first = 0; first < count; first += kTrianglesAtOnce) {
       Batch& batch = batches_.emplace_back();
       batch.surface = surface;
@@ -127,14 +188,7 @@ TriangleBins::TriangleBins(const SceneTriangles& triangles)
 }
 
 /// Vertices on the grid of samples lie up to 1/32 pixel away, and samples 1/16 inside of their pixels.
-TriangleBins::TileBox TriangleBins::tilesOf(const ScreenVertex* vertices, size_t count) const {
-  float x0 = vertices[0].x, x1 = x0, y0 = vertices[0].y, y1 = y0;
-  for (size_t n = 1; n < count; ++n) {
-    x0 = std::min(x0, vertices[n].x);
-    x1 = std::max(x1, vertices[n].x);
-    y0 = std::min(y0, vertices[n].y);
-    y1 = std::max(y1, vertices[n].y);
-  }
+TriangleBins::TileBox TriangleBins::tilesOf(float x0, float y0, float x1, float y1) const {
   const auto width = static_cast<float>(size_.width), height = static_cast<float>(size_.height);
   // NaN and infinity are nowhere.
   if (!(x0 < width && x1 >= 0 && y0 < height && y1 >= 0 && x0 > -INFINITY && x1 < INFINITY &&
@@ -148,51 +202,48 @@ TriangleBins::TileBox TriangleBins::tilesOf(const ScreenVertex* vertices, size_t
           tile(x1, width, kSampleTileWidth), tile(y1, height, kSampleTileHeight)};
 }
 
-std::vector<TriangleBins::Piece> TriangleBins::piecesOf(const SceneTriangles& triangles,
-                                                        const Batch& batch) const {
+void TriangleBins::addTriangles(const SceneTriangles& triangles, const Batch& batch, Pieces& pieces) const {
   const TriangleMesh& mesh = *triangles.scene().surfaces[batch.surface].mesh;
   const std::vector<ScreenVertex>& vertices = triangles.verticesOf(batch.surface);
-  std::vector<Piece> pieces;
-  // The last piece's tile in pixels, where it is one tile: most triangles lie in their predecessor's.
-  float left = 0, top = 0, right = 0, bottom = 0;
-  uint32_t end = 0;  // of the last piece
+  const auto add = [&](uint32_t n, const ScreenVertex* at, size_t count) {
+    float x0 = at[0].x, x1 = x0, y0 = at[0].y, y1 = y0;
+    for (size_t v = 1; v < count; ++v) {
+      x0 = std::min(x0, at[v].x);
+      x1 = std::max(x1, at[v].x);
+      y0 = std::min(y0, at[v].y);
+      y1 = std::max(y1, at[v].y);
+    }
+    pieces.add(n, x0, y0, x1, y1);
+  };
   for (uint32_t n = batch.first; n < batch.first + batch.count; ++n) {
     const auto& corners = mesh.triangles[n];
     const ScreenVertex at[3] = {vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]};
-    const bool before_near = std::isnan(at[0].value + at[1].value + at[2].value);
-    const bool within =
-        std::min({at[0].x, at[1].x, at[2].x}) >= left && std::max({at[0].x, at[1].x, at[2].x}) < right &&
-        std::min({at[0].y, at[1].y, at[2].y}) >= top && std::max({at[0].y, at[1].y, at[2].y}) < bottom;
-    if (within && !before_near && end == n) {
-      ++pieces.back().run.count;
-      ++end;
+    if (!std::isnan(at[0].value + at[1].value + at[2].value)) {
+      add(n, at, 3);
       continue;
     }
-    TileBox box;
-    if (before_near) {
-      const NearPolygon polygon = triangles.behindNear(batch.surface, corners);
-      if (polygon.count >= 3) box = tilesOf(polygon.vertices.data(), polygon.count);
-    } else {
-      box = tilesOf(at, 3);
-    }
-    if (box.empty()) continue;
-    if (end == n && !pieces.empty() && pieces.back().box == box) {
-      ++pieces.back().run.count;
-    } else {
-      pieces.push_back({box, {n, 1}});
-      const bool one = box.x0 == box.x1 && box.y0 == box.y1;
-      left = static_cast<float>(box.x0 * kSampleTileWidth);
-      top = static_cast<float>(box.y0 * kSampleTileHeight);
-      right = one ? static_cast<float>(std::min((box.x0 + 1) * kSampleTileWidth, size_.width)) : left;
-      bottom = static_cast<float>(std::min((box.y0 + 1) * kSampleTileHeight, size_.height));
-    }
-    end = n + 1;
+    const NearPolygon polygon = triangles.behindNear(batch.surface, corners);
+    if (polygon.count >= 3) add(n, polygon.vertices.data(), polygon.count);
   }
-  return pieces;
+}
+
+void TriangleBins::addCapsules(const SceneTriangles& triangles, const Batch& batch, Pieces& pieces) const {
+  const CapsuleLook look = triangles.lookOf(batch.surface);
+  for (uint32_t n = batch.first; n < batch.first + batch.count; ++n) {
+    if (triangles.beginOf(batch.surface, n) == SceneTriangles::kNoCapsule) {
+      pieces.skip(n);
+      continue;
+    }
+    const CapsuleBox box = boxOf(triangles.capsuleOf(batch.surface, n), look);
+    pieces.add(n, box.x0, box.y0, box.x1, box.y1);
+  }
 }
 
 void TriangleBins::sort(const SceneTriangles& triangles, Batch& batch) const {
-  const std::vector<Piece> pieces = piecesOf(triangles, batch);
+  Pieces of_batch(*this);
+  triangles.isCurve(batch.surface) ? addCapsules(triangles, batch, of_batch)
+                                   : addTriangles(triangles, batch, of_batch);
+  const std::vector<Piece>& pieces = of_batch.all();
   if (pieces.empty()) return;
   TileBox all = pieces.front().box;
   for (const Piece& piece : pieces) {

@@ -1,17 +1,19 @@
-// The triangles of all surfaces of a scene in one view: their vertices on the screen, the samples that
-// pixels see them with, and the tiles of the picture that they may be seen in.
+// The triangles of all surfaces of a scene in one view, and the capsules of its lines and points: their vertices on the
+// screen, the samples that pixels see them with, and the tiles of the picture that they may be seen in.
 //
 //   SurfaceScene -> SceneTriangles: vertices -> TriangleBins: by tile -> rasterizer.h: PixelSamples
 //
-// A triangle's number counts through all surfaces, so that samples can name it. Vertices take 12 bytes each,
-// bins at most some 8 bytes a triangle. Both are built in parallel, on the caller's TBB arena, and are
-// immutable then; any thread.
+// The curves of a scene come after its surfaces, as if they were surfaces, too. A capsule has the number of the point at
+// which it ends among the points of its curves. Numbers count through all triangles and points, so that samples can name
+// them. Vertices take 12 bytes each, points 16, bins at most some 8 bytes a triangle or point. Both are built in parallel,
+// on the caller's TBB arena, and are immutable then; any thread.
 #pragma once
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -20,17 +22,12 @@
 #include <vector>
 
 #include "render/project/screen_view.h"
+#include "render/surface/capsule.h"
 #include "render/surface/surface_scene.h"
 
 namespace curvisplat {
 
-/// A vertex on the screen. `value` increases with the depth and is linear there: orthographic, the depth;
-/// perspective, minus the inverse of the view's z.
-struct ScreenVertex {
-  float x, y, value;
-};
-
-/// The vertices of each surface.
+/// The vertices of each surface, and the points of each of the curves after them.
 using ScreenVertices = std::vector<std::vector<ScreenVertex>>;
 
 /// The part of a triangle behind the near plane: a polygon of 3 or 4 vertices, or none.
@@ -39,7 +36,7 @@ struct NearPolygon {
   size_t count = 0;
 };
 
-/// Numbers of triangles count through all surfaces.
+/// Numbers of triangles count through all surfaces, and then those of capsules through all curves.
 class SceneTriangles {
  public:
   /// The scene outlives it. Transforms all vertices, in parallel: 12 bytes each, in `memory` that another
@@ -53,7 +50,11 @@ class SceneTriangles {
   uint32_t count() const { return begins_.back(); }
   const ScreenView& view() const { return view_; }
   const SurfaceScene& scene() const { return scene_; }
-  /// The surface of a triangle, and its number there.
+  size_t sheets() const { return begins_.size() - 1; }  // surfaces and curves
+  bool isCurve(size_t surface) const { return surface >= scene_.surfaces.size(); }
+  const Curves& curvesOf(size_t curve) const { return scene_.curves[curve - scene_.surfaces.size()]; }
+  bool isOpaque(size_t surface) const;
+  /// The surface of a triangle, and its number there; or the curves of a capsule, and the point at which it ends.
   struct Place {
     size_t surface;
     uint32_t triangle;
@@ -66,6 +67,21 @@ class SceneTriangles {
   /// Perspective: the value of a vertex before the near plane is NaN.
   const std::vector<ScreenVertex>& verticesOf(size_t surface) const { return vertices_[surface]; }
   NearPolygon behindNear(size_t surface, const std::array<uint32_t, 3>& corners) const;
+  static constexpr uint32_t kNoCapsule = std::numeric_limits<uint32_t>::max();
+  /// The point at which the capsule begins that ends at `point`; kNoCapsule: none ends there.
+  uint32_t beginOf(size_t curve, uint32_t point) const {
+    return capsule_begins_[curve - scene_.surfaces.size()][point];
+  }
+  /// The capsule's part behind the near plane, and not far outside of the picture; NaN: it has none.
+  Capsule capsuleOf(size_t curve, uint32_t point) const {
+    const std::vector<ScreenVertex>& vertices = vertices_[curve];
+    const Capsule whole{vertices[beginOf(curve, point)], vertices[point]};
+    const auto isNear = [](const ScreenVertex& at) {
+      return std::abs(at.x) <= kGuard && std::abs(at.y) <= kGuard && at.value == at.value;
+    };
+    return isNear(whole.a) && isNear(whole.b) ? whole : cutCapsule(curve, point);
+  }
+  const CapsuleLook& lookOf(size_t curve) const { return looks_[curve - scene_.surfaces.size()]; }
   /// The depth that PixelLayers has, of a value at a pixel.
   float depthOf(float value, float x, float y) const;
 
@@ -73,13 +89,23 @@ class SceneTriangles {
   Place placeOfSeveral(uint32_t number) const;
   glm::dvec3 inView(size_t surface, uint32_t vertex) const;
   ScreenVertex project(const glm::dvec3& in_view) const;
-  void projectAll(const TriangleMesh& mesh, std::vector<ScreenVertex>& out) const;
+  void projectAll(const glm::dvec3& origin, const std::vector<glm::vec3>& positions,
+                  std::vector<ScreenVertex>& out) const;
+  static constexpr float kGuard = 1e5f;  // pixels: a capsule that reaches beyond is cut there
+
+  std::vector<uint32_t> capsuleBegins(size_t curve) const;
+  Capsule cutCapsule(size_t curve, uint32_t point) const;
+  CapsuleLook makeLook(const Curves& curves) const;
+  const glm::dvec3& originOf(size_t surface) const;
+  const std::vector<glm::vec3>& positionsOf(size_t surface) const;
 
   const SurfaceScene& scene_;
   const ScreenView view_;
   const double depth_origin_;
-  std::vector<uint32_t> begins_;  // [surfaces + 1]
+  std::vector<uint32_t> begins_;  // [surfaces + curves + 1]
   ScreenVertices vertices_;
+  std::vector<std::vector<uint32_t>> capsule_begins_;  // [curves][points]
+  std::vector<CapsuleLook> looks_;                     // [curves]
 };
 
 /// Pixels: the tiles in which samples are drawn.
@@ -100,7 +126,7 @@ struct SamplePlaces {
 };
 inline constexpr SamplePlaces kSamplePlaces;
 
-/// The triangles that the samples of a pixel see: the triangle's number, and its value there.
+/// The triangles and capsules that the samples of a pixel see: their numbers, and their values there.
 struct PixelSamples {
   static constexpr uint32_t kNothing = std::numeric_limits<uint32_t>::max();
 
@@ -109,15 +135,15 @@ struct PixelSamples {
 };
 static_assert(sizeof(PixelSamples) == 64);
 
-/// Consecutive triangles of a surface.
+/// Consecutive triangles of a surface, or points of curves.
 struct TriangleRun {
   uint32_t first, count;
 };
 
-/// The triangles that may be seen in each tile of a picture.
+/// The triangles and capsules that may be seen in each tile of a picture.
 ///
-/// A triangle is listed in every tile that its box of pixels touches; triangles outside of the picture,
-/// before the near plane or without a size on the grid of samples are listed nowhere. Batches of triangles
+/// A triangle or capsule is listed in every tile that its box of pixels touches; those outside of the picture,
+/// before the near plane or, of triangles, without a size on the grid of samples are listed nowhere. Batches of triangles
 /// are sorted by tile in parallel, each on its own. Consecutive triangles in the same tiles, which meshes
 /// mostly have, are one run: 8 bytes a run and tile.
 class TriangleBins {
@@ -165,8 +191,10 @@ class TriangleBins {
     TileBox box;
     TriangleRun run;
   };
-  TileBox tilesOf(const ScreenVertex* vertices, size_t count) const;
-  std::vector<Piece> piecesOf(const SceneTriangles& triangles, const Batch& batch) const;
+  class Pieces;
+  TileBox tilesOf(float x0, float y0, float x1, float y1) const;
+  void addTriangles(const SceneTriangles& triangles, const Batch& batch, Pieces& pieces) const;
+  void addCapsules(const SceneTriangles& triangles, const Batch& batch, Pieces& pieces) const;
   void sort(const SceneTriangles& triangles, Batch& batch) const;
 
   int columns_, rows_;

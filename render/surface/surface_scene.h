@@ -78,7 +78,7 @@ struct GridSurface {
 
 struct CurveSet;
 
-/// Lines and points, drawn as tubes and spheres: as a Surface that depends on the view (curve_meshes.h).
+/// Lines and points, drawn as lit tubes and spheres: capsule by capsule (render/surface/capsule.h).
 struct Curves {
   std::shared_ptr<const CurveSet> set;  // render/mesh/curve_set.h
   double width = 3;
@@ -88,7 +88,7 @@ struct Curves {
   std::shared_ptr<const TransferFunction> function = nullptr;  // that `colours` are of
   std::string title = {};                                      // of the values
   double opacity = 1;
-  // The whole trajectories, of which `set` is what a time shows (curvesAt() in curve_meshes.h); null: the set is the same at
+  // The whole trajectories, of which `set` is what a time shows (curvesAt() in curve_times.h); null: the set is the same at
   // all times.
   std::shared_ptr<const CurveSet> whole = nullptr;
   std::optional<double> tail = std::nullopt;  // of the part, in time; none: all before that time

@@ -6,6 +6,9 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
+#include <vector>
+
+#include "render/mesh/curve_set.h"
 
 namespace curvisplat {
 
@@ -94,6 +97,7 @@ void SurfaceShader::gather(std::span<const Spot> spots, Corners& out) const {
   };
   for (size_t n = 0; n < spots.size(); ++n) {
     const auto [number, triangle] = triangles_.placeOf(spots[n].number);
+    if (triangles_.isCurve(number)) continue;
     const Surface& surface = triangles_.scene().surfaces[number];
     const TriangleMesh& mesh = *surface.mesh;
     const auto& corners = mesh.triangles[triangle];
@@ -159,7 +163,7 @@ void SurfaceShader::mix(const Corners& __restrict c, size_t count, Mixed& __rest
 }
 
 void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> points) const {
-  Corners corners;
+  Corners corners{};  // those of capsules are not used
   const auto clear = [](std::array<Corners::Row, 3>& rows) {
     for (Corners::Row& row : rows) row.fill(NAN);
   };
@@ -172,8 +176,13 @@ void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> poi
   else
     mix<false>(corners, spots.size(), mixed);
   for (size_t n = 0; n < spots.size(); ++n) {
-    const Surface& surface = triangles_.scene().surfaces[triangles_.placeOf(spots[n].number).surface];
+    const size_t number = triangles_.placeOf(spots[n].number).surface;
     Point& point = points[n];
+    if (triangles_.isCurve(number)) {
+      shadeCapsule(spots[n], point);
+      continue;
+    }
+    const Surface& surface = triangles_.scene().surfaces[number];
     point.normal = {mixed.normal_x[n], mixed.normal_y[n], mixed.normal_z[n]};
     point.opacity = static_cast<float>(surface.opacity.factor);
     const ColourTable& colours = surface.colours ? *surface.colours : tables_.colours;
@@ -187,6 +196,58 @@ void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> poi
   }
 }
 
+/// Turns the normal of a wide tube as evenly as if the line were a smooth curve: at a joint it is at right angles to the
+/// mean of both directions. Joints of more than 60 degrees stay sharp.
+void SurfaceShader::smoothJoints(size_t curve, uint32_t end, CapsulePlace& place) const {
+  constexpr float kSharpest = 0.5f;  // cosine of the angle between directions
+  const CapsuleLook& look = triangles_.lookOf(curve);
+  const auto axisAt = [&](uint32_t point) { return axisOf(triangles_.capsuleOf(curve, point), look); };
+  const uint32_t begin = triangles_.beginOf(curve, end);
+  const auto& points = triangles_.verticesOf(curve);
+  const glm::vec3 axis = axisAt(end);
+  glm::vec3 first = axis, last = axis;
+  const auto join = [&](uint32_t other, glm::vec3& at) {
+    const glm::vec3 of_other = axisAt(other);
+    if (!(glm::dot(of_other, axis) > kSharpest)) return false;
+    at += of_other;
+    return true;
+  };
+  const bool goes_on_before =
+      triangles_.beginOf(curve, begin) != SceneTriangles::kNoCapsule && begin != end && join(begin, first);
+  uint32_t next = end + 1;
+  while (next < points.size() && triangles_.beginOf(curve, next) == SceneTriangles::kNoCapsule) ++next;
+  const bool goes_on_after =
+      next < points.size() && triangles_.beginOf(curve, next) == end && join(next, last);
+  if ((place.along <= 0 && !goes_on_before) || (place.along >= 1 && !goes_on_after)) return;
+  const glm::vec3 tangent = (1 - place.along) * glm::normalize(first) + place.along * glm::normalize(last);
+  const glm::vec3 across =
+      place.normal - glm::dot(place.normal, tangent) / glm::dot(tangent, tangent) * tangent;
+  const float length = glm::length(across);
+  if (length > 0.1f) place.normal = across / length;
+}
+
+void SurfaceShader::shadeCapsule(const Spot& spot, Point& point) const {
+  const auto [curve, end] = triangles_.placeOf(spot.number);
+  const Curves& curves = triangles_.curvesOf(curve);
+  const ScreenView& view = triangles_.view();
+  constexpr float kWide = 2;  // pixels
+  const CapsuleLook& look = triangles_.lookOf(curve);
+  const Capsule capsule = triangles_.capsuleOf(curve, end);
+  CapsulePlace place = placeOn(capsule, look, spot.x, spot.y);
+  if (look.radiusAt(capsule.a.value) > kWide) smoothJoints(curve, end, place);
+  const glm::dvec3 stretched = double{place.normal.x} * view.right + double{place.normal.y} * view.down +
+                               double{place.normal.z} * view.forward;
+  point.normal = glm::vec3(stretched * view.scale);
+  point.opacity = static_cast<float>(curves.opacity);
+  point.colour = curves.colour;
+  const std::vector<float>& values = curves.set->values;
+  if (values.empty()) return;
+  const float begin = values[triangles_.beginOf(curve, end)];
+  const float scalar = begin + place.along * (values[end] - begin);
+  if (!std::isnan(scalar))
+    point.colour = (curves.colours ? *curves.colours : tables_.colours).at(double{scalar});
+}
+
 void SurfaceShader::shade(std::span<const Spot> spots, std::span<Point> points) const {
   for (size_t begin = 0; begin < spots.size(); begin += kAtOnce) {
     const size_t count = std::min(kAtOnce, spots.size() - begin);
@@ -198,6 +259,11 @@ bool SurfaceShader::meet(uint32_t a, uint32_t b) const {
   const auto [surface, triangle] = triangles_.placeOf(a);
   const auto [other_surface, other_triangle] = triangles_.placeOf(b);
   if (surface != other_surface) return false;
+  if (triangles_.isCurve(surface)) {
+    const uint32_t begin = triangles_.beginOf(surface, triangle),
+                   other_begin = triangles_.beginOf(surface, other_triangle);
+    return begin == other_triangle || triangle == other_begin || begin == other_begin;
+  }
   const TriangleMesh& mesh = *triangles_.scene().surfaces[surface].mesh;
   const auto &x = mesh.triangles[triangle], &y = mesh.triangles[other_triangle];
   bool any = false;
@@ -205,8 +271,22 @@ bool SurfaceShader::meet(uint32_t a, uint32_t b) const {
   return any;
 }
 
+/// The slope of the axis, and that of the round sides but for their outermost part.
+static float capsuleSteepness(const Capsule& capsule, const ScreenView& view) {
+  constexpr float kRound = 2;  // pixels
+  const auto& [a, b] = capsule;
+  const float pixel = (view.projection == Projection::kPerspective ? std::abs(a.value) : 1.0f) /
+                      static_cast<float>(view.focal_px);
+  const float steep =
+      std::abs(b.value - a.value) / std::sqrt((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y)) +
+      kRound * pixel;
+  return std::isfinite(steep) ? steep : 1e30f;
+}
+
 float SurfaceShader::steepness(uint32_t number) const {
   const auto [surface, triangle] = triangles_.placeOf(number);
+  if (triangles_.isCurve(surface))
+    return capsuleSteepness(triangles_.capsuleOf(surface, triangle), triangles_.view());
   const auto& corners = triangles_.scene().surfaces[surface].mesh->triangles[triangle];
   const ScreenVertex &a = triangles_.vertex(surface, corners[0]), &b = triangles_.vertex(surface, corners[1]),
                      &c = triangles_.vertex(surface, corners[2]);

@@ -20,6 +20,7 @@
 #include "render/project/light.h"
 #include "render/project/plane_cuts.h"
 #include "render/project/screen_view.h"
+#include "render/surface/capsule.h"
 #include "render/surface/scene_triangles.h"
 
 namespace curvisplat {
@@ -56,7 +57,7 @@ class SurfaceLight {
   glm::vec3 towards_{0};
 };
 
-/// Shades triangles where they are seen: colour, normal and opacity at points of the picture.
+/// Shades triangles and capsules where they are seen: colour, normal and opacity at points of the picture.
 class SurfaceShader {
  public:
   /// The picture's tables. `opacities`: null, if no surface has the function's.
@@ -67,7 +68,7 @@ class SurfaceShader {
   /// `light`: none: a light at the viewer. The triangles and the tables outlive it.
   SurfaceShader(const SceneTriangles& triangles, const Tables& tables, const std::optional<Light>& light);
 
-  /// A triangle, and the point of the picture at which it is seen: that of the triangle next to it, if it
+  /// A triangle or capsule, and the point of the picture at which it is seen: that of the triangle next to it, if it
   /// lies beside it.
   struct Spot {
     uint32_t number;
@@ -80,12 +81,10 @@ class SurfaceShader {
   };
   /// `points` [spots]: overwritten.
   void shade(std::span<const Spot> spots, std::span<Point> points) const;
-  bool isOpaque(uint32_t number) const {
-    return triangles_.scene().surfaces[triangles_.placeOf(number).surface].opacity.opaque();
-  }
+  bool isOpaque(uint32_t number) const { return triangles_.isOpaque(triangles_.placeOf(number).surface); }
   const SurfaceLight& light() const { return light_; }
 
-  /// Whether two triangles share a vertex. There a surface is smooth, since vertices are doubled at edges,
+  /// Whether two triangles share a vertex, or capsules a point. There a surface is smooth, since vertices are doubled at edges,
   /// and each of them tells what it looks like on the other.
   bool meet(uint32_t a, uint32_t b) const;
   /// How much the value changes over a pixel, at most.
@@ -100,6 +99,8 @@ class SurfaceShader {
   static void mix(const Corners& c, size_t count, Mixed& out);
   void gather(std::span<const Spot> spots, Corners& out) const;
   void shadeBlock(std::span<const Spot> spots, std::span<Point> points) const;
+  void shadeCapsule(const Spot& spot, Point& point) const;
+  void smoothJoints(size_t curve, uint32_t end, CapsulePlace& place) const;
 
   const SceneTriangles& triangles_;
   const Tables tables_;

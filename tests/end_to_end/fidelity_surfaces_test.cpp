@@ -16,7 +16,6 @@
 #include "render/image/image.h"
 #include "render/mesh/curve_set.h"
 #include "render/project/screen_view.h"
-#include "render/surface/curve_meshes.h"
 #include "tests/reference/direct_picture.h"
 #include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
@@ -129,17 +128,14 @@ TEST_F(Surfaces, ASphereIsLitAndCutsTheSplats) {
   expectWorth("sphere", "smooth", layers, scene, {48.5, 46, 44}, 2);
 }
 
-/// The curve as surfaces, in the view of `camera`.
-std::shared_ptr<SurfaceScene> curveScene(const std::vector<glm::dvec3>& points, double width,
-                                         const Camera& camera) {
-  SurfaceScene curves;
-  Curves& one = curves.curves.emplace_back();
+/// A line.
+std::shared_ptr<SurfaceScene> curveScene(const std::vector<glm::dvec3>& points, double width) {
+  auto scene = std::make_shared<SurfaceScene>();
+  Curves& one = scene->curves.emplace_back();
   one.set = std::make_shared<CurveSet>(curveSetOf(points, {0, static_cast<uint32_t>(points.size())}, {}));
   one.width = width;
   one.in_pixels = false;
   one.colour = kGrey;
-  auto scene = std::make_shared<SurfaceScene>();
-  scene->surfaces = curveSurfaces(curves, ScreenView::of(camera, kSize, glm::dvec3(1), kLowPass, 1e-3));
   return scene;
 }
 
@@ -158,13 +154,13 @@ ReferenceLayers cylinderLayer(const glm::dvec3& point, const glm::dvec3& axis, d
 }
 
 TEST_F(Surfaces, APointIsALitSphereAndALineATube) {
-  const auto sphere = curveScene({kCentre}, 2 * kRadius, camera_);
+  const auto sphere = curveScene({kCentre}, 2 * kRadius);
   expectWorth("point", "smooth", sphereLayer(kCentre, kRadius, glm::dvec3(kGrey)), sphere, {46, 45.5, 44.5},
               2);
   const glm::dvec3 axis(3, -2, 2.4);
   std::vector<glm::dvec3> points;
   for (int n = 0; n <= 20; ++n) points.push_back(kCentre + (n - 10) / 10.0 * axis);
-  const auto tube = curveScene(points, 0.2, camera_);
+  const auto tube = curveScene(points, 0.2);
   expectWorth("line", "smooth", cylinderLayer(kCentre, axis, 0.1), tube, {43.5, 43, 42.5}, 2);
 }
 

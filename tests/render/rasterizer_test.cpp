@@ -4,10 +4,14 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <memory>
 #include <random>
+#include <vector>
 
+#include "render/mesh/curve_set.h"
 #include "render/surface/scene_layers.h"
 #include "stream/base/progress.h"
 
@@ -157,8 +161,43 @@ TEST_P(Rasterizer, SeesWhatIsNearestAtEverySample) {
   EXPECT_GT(compared, kSamples * kSize.pixels() / 2);
 }
 
+/// A line of the points.
+Curves lineOf(const std::vector<glm::dvec3>& points, double width) {
+  Curves curves;
+  curves.set = std::make_shared<CurveSet>(curveSetOf(points, {0, static_cast<uint32_t>(points.size())}, {}));
+  curves.width = width;
+  curves.in_pixels = false;
+  return curves;
+}
+
+/// Segments and points of many sizes, one a curve.
+SurfaceScene randomCurves(int count) {
+  std::mt19937 random(3);
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) / 4294967295.0;
+  };
+  SurfaceScene scene;
+  for (int n = 0; n < count; ++n) {
+    const double size = n % 5 == 0 ? 0 : std::pow(10, between(-2, 0.5));
+    const glm::dvec3 at(between(-4.5, 4.5), between(-1.2, 1.2), between(-1, 3));
+    const glm::dvec3 way(between(-size, size), between(-size, size), between(-0.3 * size, 0.3 * size));
+    scene.curves.push_back(
+        lineOf(size > 0 ? std::vector{at, at + way} : std::vector{at}, std::pow(10, between(-1.5, -0.3))));
+  }
+  return scene;
+}
+
+/// How far a point lies from a segment.
+double distanceTo(const std::vector<glm::vec3>& ends, const glm::dvec3& origin, const glm::dvec3& point) {
+  const glm::dvec3 a = origin + glm::dvec3(ends.front()), way = origin + glm::dvec3(ends.back()) - a;
+  const double length2 = glm::dot(way, way);
+  const double part = length2 > 0 ? std::clamp(glm::dot(point - a, way) / length2, 0.0, 1.0) : 0;
+  return glm::length(point - a - part * way);
+}
+
 TEST_P(Rasterizer, TheLayersAreTheSameForAnyThreads) {
-  const SurfaceScene scene = randomScene(GetParam() == Projection::kPerspective ? 5.5 : 3);
+  SurfaceScene scene = randomScene(GetParam() == Projection::kPerspective ? 5.5 : 3);
+  scene.curves = randomCurves(20).curves;
   const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
   const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
   const SceneLook look{colours, {}, {}, 0};
@@ -179,6 +218,113 @@ TEST_P(Rasterizer, TheLayersAreTheSameForAnyThreads) {
       }
     }
   EXPECT_GT(layers, 1000u);
+}
+
+TEST_P(Rasterizer, SeesCapsulesWhereRaysThatStepByDistanceMeetThem) {
+  constexpr ImageSize kSmall{150, 40};
+  const SurfaceScene scene = randomCurves(60);
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSmall, glm::dvec3(1.0), kLowPass, 0.1);
+  const bool perspective = GetParam() == Projection::kPerspective;
+  const SceneTriangles triangles(scene, view, 0);
+  const TriangleBins bins(triangles);
+  size_t seen = 0, wrong = 0;
+  SampleTile tile;
+  for (int row = 0; row < bins.rows(); ++row)
+    for (int column = 0; column < bins.columns(); ++column) {
+      ASSERT_TRUE(tile.draw(triangles, bins, column, row));
+      for (int y = tile.y0(); y <= tile.y1(); ++y)
+        for (int x = tile.x0(); x <= tile.x1(); ++x)
+          for (size_t s = 0; s < kSamples; ++s) {
+            const double across =
+                (x + 0.5 + kSampleOffsets[s][0] / 16.0 - 0.5 * kSmall.width) / view.focal_px;
+            const double down = (y + 0.5 + kSampleOffsets[s][1] / 16.0 - 0.5 * kSmall.height) / view.focal_px;
+            const glm::dvec3 aside = across * view.right + down * view.down;
+            const glm::dvec3 start = view.eye + (perspective ? glm::dvec3(0.0) : aside);
+            const glm::dvec3 step = view.forward + (perspective ? aside : glm::dvec3(0.0));
+            double nearest = INFINITY;
+            for (const Curves& curves : scene.curves) {
+              double t = 0.1, away = INFINITY;
+              for (int n = 0; n < 200 && t < std::min(nearest, 8.0) && away > 1e-7; ++n) {
+                away = distanceTo(curves.set->positions, curves.set->origin, start + t * step) -
+                       0.5 * curves.width;
+                t += std::max(away, 0.0) / glm::length(step);
+              }
+              if (away < 1e-5) nearest = std::min(nearest, t);
+            }
+            const double value = double{tile.at(x, y).values[s]}, depth = perspective ? -1 / value : value;
+            seen += nearest < INFINITY;
+            const bool any = tile.at(x, y).numbers[s] != PixelSamples::kNothing;
+            wrong += any != (nearest < INFINITY) || (any && std::abs(depth - nearest) > 2e-3);
+          }
+    }
+  EXPECT_GT(seen, 4'000u);
+  EXPECT_LT(wrong, seen / 500);  // at outlines rounding decides
+}
+
+TEST_P(Rasterizer, TheOrderOfCapsulesDoesNotMatter) {
+  SurfaceScene scene = randomCurves(3000), reversed = scene;
+  std::reverse(reversed.curves.begin(), reversed.curves.end());
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const SceneTriangles triangles(scene, view, 0), others(reversed, view, 0);
+  const TriangleBins bins(triangles), other_bins(others);
+  SampleTile tile, other;
+  for (int row = 0; row < bins.rows(); ++row)
+    for (int column = 0; column < bins.columns(); ++column) {
+      ASSERT_TRUE(tile.draw(triangles, bins, column, row));
+      ASSERT_TRUE(other.draw(others, other_bins, column, row));
+      for (int y = tile.y0(); y <= tile.y1(); ++y)
+        for (int x = tile.x0(); x <= tile.x1(); ++x)
+          ASSERT_EQ(tile.at(x, y).values, other.at(x, y).values) << x << ", " << y;
+    }
+}
+
+TEST_P(Rasterizer, ATranslucentTubeIsOneLayer) {
+  std::vector<glm::dvec3> arc;
+  for (int n = 0; n <= 300; ++n)
+    arc.emplace_back(3 * std::cos(0.01 * n), 0.7 * std::sin(0.01 * n), std::cos(0.02 * n));
+  SurfaceScene scene;
+  scene.curves.push_back(lineOf(arc, 0.2));
+  scene.curves.back().opacity = 0.5;
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
+  const PixelLayers layers = layersOf(scene, view, {}, {colours, {}, {}, 0});
+  size_t whole = 0, several = 0;
+  for (int y = 0; y < kSize.height; ++y)
+    for (int x = 0; x < kSize.width; ++x) {
+      const auto at = layers.at(x, y);
+      whole += at.size() == 1 && at[0].colour.w == 0.5f;
+      several += at.size() > 1;
+    }
+  EXPECT_GT(whole, 300u);
+  EXPECT_LT(several, whole / 50);  // where its end turns away from the viewer
+}
+
+TEST_P(Rasterizer, DrawsThePointsAtWhichALineOrItsValuesTurn) {
+  std::vector<glm::dvec3> corner;
+  for (int n = 0; n <= 1000; ++n)
+    corner.emplace_back(n <= 400 ? -3 + 0.01 * n : 1, n > 400 ? 0.001 * n - 0.4 : 0, 0);
+  SurfaceScene scene;
+  scene.curves.push_back(lineOf(corner, 0.2));
+  CurveSet with_values = *scene.curves[0].set;
+  for (int n = 0; n <= 1000; ++n) with_values.values.push_back(static_cast<float>(std::min(n, 200)));
+  scene.curves.push_back(scene.curves[0]);
+  scene.curves[1].set = std::make_shared<CurveSet>(with_values);
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const SceneTriangles triangles(scene, view, 0);
+  const auto pointsOf = [&](size_t curve) {
+    std::vector<uint32_t> points;
+    for (uint32_t n = 0; n <= 1000; ++n)
+      if (triangles.beginOf(curve, n) != SceneTriangles::kNoCapsule) points.push_back(n);
+    return points;
+  };
+  // A few points later lie less than a seventh of a pixel aside, and the values less than 1/256 of their range.
+  const std::vector<uint32_t> plain = pointsOf(0), of_values = pointsOf(1);
+  ASSERT_EQ(plain.size(), 2u);
+  EXPECT_NEAR(plain[0], 400, 5);
+  EXPECT_EQ(plain[1], 1000u);
+  ASSERT_EQ(of_values.size(), 3u);
+  EXPECT_NEAR(of_values[0], 200, 3);
+  EXPECT_NEAR(of_values[1], 400, 5);
 }
 
 TEST_P(Rasterizer, StopsWithinATileOfManyTriangles) {

@@ -14,7 +14,7 @@
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
 #include "render/image/image_file.h"
-#include "render/surface/curve_meshes.h"
+#include "render/surface/curve_times.h"
 #include "stream/base/error.h"
 #include "stream/base/memory.h"
 #include "stream/base/progress.h"

@@ -10,7 +10,7 @@
 #include "preprocess/formats/vtk/vtk_curves.h"
 #include "render/colour/function_parts.h"
 #include "render/mesh/curve_set.h"
-#include "render/surface/curve_meshes.h"
+#include "render/surface/curve_times.h"
 #include "stream/base/calendar.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"

@@ -13,7 +13,7 @@
 
 #include "preprocess/formats/vtk/vtk_surface.h"
 #include "render/mesh/triangle_mesh.h"
-#include "render/surface/curve_meshes.h"
+#include "render/surface/curve_times.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"

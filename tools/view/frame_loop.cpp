@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "render/frame/frame.h"
-#include "render/surface/curve_meshes.h"
+#include "render/surface/curve_times.h"
 #include "stream/base/progress.h"
 #include "stream/base/threads.h"
 
