@@ -38,6 +38,8 @@ unsigned threadsOf(const FrameOptions& options) {
 void add(FrameStatistics& statistics, const ProjectionCounts& counts) {
   statistics.card_splats = counts.read;
   statistics.splats_read += counts.read;
+  statistics.splats_clipped += counts.clipped;
+  statistics.splats_behind += counts.hidden;
   statistics.splats_off_screen += counts.off_screen;
   statistics.splats_transparent += counts.transparent;
   statistics.splats_drawn += counts.drawn;

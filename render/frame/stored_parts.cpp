@@ -5,6 +5,8 @@
 #include "render/frame/frame_pipeline.h"
 #include "render/frame/frame_workers.h"
 #include "render/project/brick_store.h"
+#include "render/project/pixel_layers.h"
+#include "render/sweep/hidden_bricks.h"
 #include "stream/base/mutex.h"
 #include "stream/model/border_code.h"
 
@@ -14,6 +16,14 @@ namespace {
 /// The splats at borders that a worker may divide while another one does. Their pieces take a few MiB, which its
 /// projector leaves unused meanwhile; more would pass --memory with many workers.
 constexpr size_t kMaxDividedAside = 8192;
+
+/// Whether some splat of the brick may lie across or behind the layers of its pixels.
+bool meetsLayers(const Brick& brick, const ProjectionSettings& settings) {
+  if (!settings.layers) return false;
+  const PixelLayers& layers = *settings.layers;
+  const double nearest = layers.boundsOver(screenBoxOf(brick, settings.view)).nearest;
+  return farthestDepthOf(brick, settings.view) - layers.depthOrigin() > nearest;
+}
 
 }  // namespace
 
@@ -26,16 +36,17 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
   unread_.clear();
   if (painting_ != backend_.get()) return;  // after a picture of the same splats
   is_storing_ = false;
-  if (options.ranks || options.keep_going || coloured_by_ || !BrickStore::canDraw(plan.settings)) return;
+  if (options.ranks || options.keep_going) return;
   std::vector<uint32_t> numbers;
   for (uint32_t number = 0; number < plan.parts.size(); ++number) {
     const SweptPart& part = plan.parts[number];
     const Brick& brick = cache_.bricks()[part.part.brick];
     const glm::dvec3 cell_min = cache_.manifest().root.cellMin(brick.cell);
-    if (!BrickStore::canDraw(brick, cell_min, plan.settings)) continue;
+    if (!BrickStore::canDraw(brick, cell_min, plan.settings.view)) continue;
     numbers.push_back(number);
-    stored_.push_back(
-        {part.part.brick, brick.splats, SplatRanges(brick, part.part.octants), cell_min, part.keys});
+    stored_.push_back({part.part.brick, brick.splats, SplatRanges(brick, part.part.octants), cell_min,
+                       part.keys, BrickStore::clipsOf(brick, plan.settings),
+                       meetsLayers(brick, plan.settings), coloured_by_.has_value()});
   }
   // Bricks that are put tell how much room they need, so that fewer of the parts may fit than it seemed.
   for (;;) {
@@ -71,7 +82,7 @@ void FramePipeline::putIntoStore(std::span<const StoredPart> parts, const Border
   const auto put = [&](size_t part, const glm::dvec3&, const BrickSource::Splats& splats) {
     const auto send = [&](const BrickPieces& pieces) {
       painting_->run([&](Painter& painter) {
-        painter.store()->put(parts[part].brick, splats.geometry, splats.values, pieces);
+        painter.store()->put(parts[part].brick, splats.geometry, {splats.values, splats.second}, pieces);
       });
     };
     const uint32_t* const codes = splats.geometry.border_code;

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
 #include <optional>
 
 #include "render/gl/tile_list_shaders.h"
+#include "render/project/gradient_opacity.h"
+#include "render/project/shadow_grid.h"
 #include "render/project/splat_pieces.h"
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
@@ -14,6 +17,10 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kWordBytes = sizeof(uint32_t);
+
+size_t storedArrays(bool coloured) {
+  return kStoredArrays + (coloured ? kStoredColourArrays : 0);
+}
 
 size_t splatsOf(const StoredPart& part) {
   size_t sum = 0;
@@ -25,8 +32,9 @@ glm::vec4 fourOf(const glm::vec3& v) {
   return {v.x, v.y, v.z, 0};
 }
 
-ShaderPart shaderPart(const StoredPart& part, const ScreenView& view, const DepthKeys::Linear& keys,
-                      uint64_t begin) {
+ShaderPart shaderPart(const StoredPart& part, const ProjectionSettings& settings,
+                      const DepthKeys::Linear& keys, uint64_t begin) {
+  const ScreenView& view = settings.view;
   ShaderPart out{};
   out.base = static_cast<uint32_t>(begin);
   out.splats = static_cast<uint32_t>(part.splats);
@@ -38,6 +46,9 @@ ShaderPart shaderPart(const StoredPart& part, const ScreenView& view, const Dept
     const OrthographicMap map(view, part.cell_min);
     out.x = map.x;
     out.y = map.y;
+    if (part.layered)
+      out.layer_offset =
+          static_cast<float>(view.viewFromData(part.cell_min).z - settings.layers->depthOrigin());
   } else {
     const PerspectiveMap map(view, part.cell_min, 1);
     out.origin_x = map.origin.x;
@@ -50,13 +61,32 @@ ShaderPart shaderPart(const StoredPart& part, const ScreenView& view, const Dept
     out.eye_y = eye.y;
     out.eye_z = eye.z;
   }
+  if (part.layered) out.kinds = 1u << 8;
+  if (const ShadowGrid* const shadows = settings.shadows.get()) {
+    const glm::vec3 node((part.cell_min - shadows->lattice().lower) / shadows->lattice().edge);
+    out.node_x = node.x;
+    out.node_y = node.y;
+    out.node_z = node.z;
+  }
   return out;
+}
+
+/// The planes that may cut splats of the part, as LocalClipPlanes has them.
+std::vector<glm::vec4> planesOf(const StoredPart& part, std::span<const ClipPlane> planes) {
+  std::vector<glm::vec4> local;
+  for (size_t n = 0; n < planes.size(); ++n) {
+    if (!(part.clips >> n & 1)) continue;
+    const glm::dvec3 normal = glm::normalize(planes[n].normal);
+    local.emplace_back(glm::vec3(normal),
+                       static_cast<float>(glm::dot(normal, part.cell_min - planes[n].point)));
+  }
+  return local;
 }
 
 }  // namespace
 
 CardBricks::CardBricks(const GlFunctions& gl)
-    : gl_(gl), words_(gl), parts_(gl), groups_(gl), fates_(gl), frames_(gl) {}
+    : gl_(gl), words_(gl), parts_(gl), groups_(gl), fates_(gl), frames_(gl), planes_(gl), shading_(gl) {}
 
 void CardBricks::open(uint64_t content) {
   if (content == content_) return;
@@ -73,13 +103,14 @@ bool CardBricks::has(uint32_t brick) const {
 /// The words of the part's brick, as far as is known.
 uint64_t CardBricks::wordsOf(const StoredPart& part) const {
   const auto found = known_.find(part.brick);
-  return kStoredArrays * part.splats + (found == known_.end() ? 0 : found->second.words());
+  return storedArrays(part.coloured) * part.splats + (found == known_.end() ? 0 : found->second.words());
 }
 
 /// elementsOf() without looking for the pieces of its ranges: those of the whole brick, as far as is known.
 uint64_t CardBricks::mostElements(const StoredPart& part) const {
   const auto found = known_.find(part.brick);
-  return splatsOf(part) + (found == known_.end() ? 0 : kElementsAPiece * found->second.first.back());
+  return part.elementsASplat() * splatsOf(part) +
+         (found == known_.end() ? 0 : part.elementsAPiece() * found->second.first.back());
 }
 
 size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
@@ -141,8 +172,8 @@ std::optional<uint64_t> CardBricks::freePlace(uint64_t words) const {
   return std::nullopt;
 }
 
-void CardBricks::put(uint32_t brick, const GeometryArrays<const float>& geometry,
-                     const VariableArrays<const float>& values, const BrickPieces& pieces) {
+void CardBricks::put(uint32_t brick, const GeometryArrays<const float>& geometry, const BrickValues& values,
+                     const BrickPieces& pieces) {
   const size_t count = geometry.size();
   Known& known = known_[brick];
   known = {};
@@ -151,7 +182,7 @@ void CardBricks::put(uint32_t brick, const GeometryArrays<const float>& geometry
     known.first.push_back(splat.first);
   }
   known.first.push_back(static_cast<uint32_t>(pieces.pieces.size()));
-  const uint64_t words = kStoredArrays * count + known.words();
+  const uint64_t words = storedArrays(values.colours.has_value()) * count + known.words();
   const std::optional<uint64_t> begin = placeFor(words);
   if (!begin) {
     is_scattered_ = true;
@@ -171,8 +202,12 @@ void CardBricks::put(uint32_t brick, const GeometryArrays<const float>& geometry
   else
     add(std::span(geometry.border_code, count));
   add(std::span(geometry.growth_code, count));
-  for (const float* array : {values.mean, values.slope0, values.slope1, values.slope2, values.variance})
-    add(std::span(array, count));
+  const auto addValues = [&](const VariableArrays<const float>& of) {
+    for (const float* array : {of.mean, of.slope0, of.slope1, of.slope2, of.variance})
+      add(std::span(array, count));
+  };
+  addValues(values.scalar);
+  if (values.colours) addValues(*values.colours);
   add(std::span(pieces.splats));
   add(std::span(pieces.pieces));
   bricks_[brick] = {*begin, words, frame_};
@@ -194,7 +229,7 @@ size_t CardBricks::elementsOf(const StoredPart& part) const {
     const PieceRange in_range = piecesIn(known, range);
     pieces += known.first[in_range.end] - known.first[in_range.begin];
   }
-  return splatsOf(part) + kElementsAPiece * pieces;
+  return part.elementsASplat() * splatsOf(part) + part.elementsAPiece() * pieces;
 }
 
 void CardBricks::compile() {
@@ -240,29 +275,57 @@ void CardBricks::setView(const GlProgram& program, const ProjectionSettings& set
   setRow("scale", fourOf(glm::vec3(view.scale)));
 }
 
+/// Sends what factors of opacity and light depend on; shadows only if they have changed, since they are large.
+void CardBricks::sendShading(const GlProgram& program, const ProjectionSettings& settings) {
+  std::vector<float> points;
+  if (const GradientOpacity* const gradient = settings.gradient.get())
+    for (size_t n = 0; n < gradient->magnitudes().size(); ++n)
+      points.insert(points.end(), {gradient->magnitudes()[n], gradient->factors()[n]});
+  const std::span<const float> arriving =
+      settings.shadows ? settings.shadows->arriving() : std::span<const float>();
+  const uint64_t before = shading_.bytes(), begin = points.size() * sizeof(float);
+  shading_.reserve(std::max<uint64_t>(begin + arriving.size_bytes(), sizeof(float)));
+  shading_.write(0, std::span<const float>(points));
+  if (shading_.bytes() != before || settings.shadows != shadows_ || begin != shadows_begin_)
+    shading_.write(begin, arriving);
+  shadows_ = settings.shadows;
+  shadows_begin_ = begin;
+  gl_.Uniform1ui(program.uniform("steepness_points"), static_cast<GLuint>(points.size() / 2));
+  const ShadowLattice lattice = shadows_ ? shadows_->lattice() : ShadowLattice{};
+  gl_.Uniform3i(program.uniform("lattice_nodes"), shadows_ ? lattice.nodes[0] : 0, lattice.nodes[1],
+                lattice.nodes[2]);
+  const glm::vec3 per_edge(1.0 / lattice.edge);
+  gl_.Uniform4f(program.uniform("nodes_per_unit"), per_edge.x, per_edge.y, per_edge.z, 0);
+}
+
 void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& keys,
                          std::span<const StoredPart> parts, const SplatTables& tables, float largest_scalar,
                          const CardBuffer& splats) {
   std::vector<ShaderPart> shader_parts;
   std::vector<ShaderGroup> groups, groups_of_pieces;
+  std::vector<glm::vec4> planes;
   uint32_t slot = 0;
   for (const StoredPart& part : parts) {
     const Known& known = known_.at(part.brick);
     const auto number = static_cast<uint32_t>(shader_parts.size());
     shader_parts.push_back(
-        shaderPart(part, settings.view, keys.linear(part.cell_min), bricks_.at(part.brick).begin));
+        shaderPart(part, settings, keys.linear(part.cell_min), bricks_.at(part.brick).begin));
     shader_parts.back().splats_in_pieces = static_cast<uint32_t>(known.splats.size());
+    const std::vector<glm::vec4> of_part = planesOf(part, settings.clip_planes);
+    shader_parts.back().first_plane = static_cast<uint32_t>(planes.size());
+    shader_parts.back().kinds |= static_cast<uint32_t>(of_part.size());
+    planes.insert(planes.end(), of_part.begin(), of_part.end());
     for (const SplatRange& range : part.ranges) {
       for (uint32_t first = range.begin; first < range.end; first += kProjectThreads) {
         groups.push_back({number, first, std::min(kProjectThreads, range.end - first), slot});
-        slot += groups.back().count;
+        slot += static_cast<uint32_t>(part.elementsASplat()) * groups.back().count;
       }
       const PieceRange pieces = piecesIn(known, range);
       for (size_t first = pieces.begin; first < pieces.end; first += kProjectThreads) {
         const size_t end = std::min(first + kProjectThreads, pieces.end);
         groups_of_pieces.push_back(
             {number, static_cast<uint32_t>(first), static_cast<uint32_t>(end - first), slot});
-        slot += kElementsAPiece * (known.first[end] - known.first[first]);
+        slot += static_cast<uint32_t>(part.elementsAPiece()) * (known.first[end] - known.first[first]);
       }
     }
   }
@@ -272,7 +335,9 @@ void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& ke
   parts_.write(0, std::span<const ShaderPart>(shader_parts));
   groups_.reserve(groups.size() * sizeof(ShaderGroup));
   groups_.write(0, std::span<const ShaderGroup>(groups));
-  fates_.reserve(4 * sizeof(uint32_t));
+  planes_.reserve(std::max<size_t>(planes.size(), 1) * sizeof(glm::vec4));
+  planes_.write(0, std::span<const glm::vec4>(planes));
+  fates_.reserve(kFates * sizeof(uint32_t));
   fates_.clear();
   if (frames_.bytes() == 0) {
     const std::span<const GrowthFrame> frames = growthFrames();
@@ -285,10 +350,15 @@ void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& ke
   const auto count = static_cast<uint32_t>(groups.size());
   gl_.Uniform1ui(projecting.uniform("group_count"), count);
   gl_.Uniform1ui(projecting.uniform("groups_of_splats"), groups_of_splats);
+  const bool coloured = !parts.empty() && parts.front().coloured;  // all are, or none
+  gl_.Uniform1ui(projecting.uniform("colour_records"), coloured ? 1 : 0);
+  gl_.Uniform1ui(projecting.uniform("stored_arrays"), static_cast<GLuint>(storedArrays(coloured)));
   gl_.Uniform1f(projecting.uniform("reach"),
                 1.001f * static_cast<float>(largestReach(settings.view.low_pass_px2)));
   gl_.Uniform1f(projecting.uniform("largest_scalar"), largest_scalar);
-  const CardBuffer* const buffers[] = {&splats, &words_, &parts_, &groups_, &fates_, &frames_};
+  sendShading(projecting, settings);
+  const CardBuffer* const buffers[] = {&splats, &words_,  &parts_,  &groups_,
+                                       &fates_, &frames_, &planes_, &shading_};
   for (GLuint binding = 0; binding < std::size(buffers); ++binding) buffers[binding]->bind(binding);
   gl_.DispatchCompute(std::min(count, kMaxGroups), (count + kMaxGroups - 1) / kMaxGroups, 1);
   gl_.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
@@ -296,14 +366,16 @@ void CardBricks::project(const ProjectionSettings& settings, const DepthKeys& ke
 }
 
 ProjectionCounts CardBricks::counts() const {
-  std::array<uint32_t, 4> fates{};
+  std::array<uint32_t, kFates> fates{};
   fates_.bind();
   gl_.GetBufferSubData(GL_SHADER_STORAGE_BUFFER, 0, sizeof(fates), fates.data());
   ProjectionCounts counts;
   counts.off_screen = fates[0];
   counts.transparent = fates[1];
   counts.drawn = fates[2];
-  counts.read = counts.off_screen + counts.transparent + counts.drawn;
+  counts.clipped = fates[4];
+  counts.hidden = fates[5];
+  counts.read = counts.off_screen + counts.transparent + counts.drawn + counts.clipped + counts.hidden;
   return counts;
 }
 

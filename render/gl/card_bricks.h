@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -27,10 +28,10 @@ class CardBricks {
   void open(uint64_t content);
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes);
   bool has(uint32_t brick) const;
-  void put(uint32_t brick, const GeometryArrays<const float>& geometry,
-           const VariableArrays<const float>& values, const BrickPieces& pieces);
-  /// The number of elements that project() writes for a part of a stored brick: one for each splat, and
-  /// kElementsAPiece for each piece.
+  void put(uint32_t brick, const GeometryArrays<const float>& geometry, const BrickValues& values,
+           const BrickPieces& pieces);
+  /// The number of elements that project() writes for a part of a stored brick: those of its splats and of its
+  /// pieces.
   size_t elementsOf(const StoredPart& part) const;
   /// Projects the parts into the first elements of `splats`, whether they are drawn or not. `tables` are the
   /// frame's.
@@ -38,7 +39,9 @@ class CardBricks {
                const SplatTables& tables, float largest_scalar, const CardBuffer& splats);
   /// Waits for the last project() and returns its counts.
   ProjectionCounts counts() const;
-  uint64_t cardBytes() const { return words_.bytes() + parts_.bytes() + groups_.bytes(); }
+  uint64_t cardBytes() const {
+    return words_.bytes() + parts_.bytes() + groups_.bytes() + planes_.bytes() + shading_.bytes();
+  }
 
  private:
   /// The pieces of a brick that was put at any time, whether it is still stored or not.
@@ -65,10 +68,13 @@ class CardBricks {
   const GlProgram& program(bool perspective);
   void setView(const GlProgram& program, const ProjectionSettings& settings,
                const DepthKeys::Linear& keys) const;
+  void sendShading(const GlProgram& program, const ProjectionSettings& settings);
 
   const GlFunctions& gl_;
   std::array<std::optional<GlProgram>, 2> programs_;  // [perspective]
-  CardBuffer words_, parts_, groups_, fates_, frames_;
+  CardBuffer words_, parts_, groups_, fates_, frames_, planes_, shading_;
+  std::shared_ptr<const ShadowGrid> shadows_;  // that `shading_` has, from `shadows_begin_` on
+  uint64_t shadows_begin_ = 0;
   std::map<uint32_t, Known> known_;        // [number]
   std::map<uint32_t, Stored> bricks_;      // [number]
   std::map<uint64_t, uint32_t> by_place_;  // [Stored::begin] number

@@ -119,8 +119,8 @@ struct GlTilePainter::State final : BrickStore {
   }
   uint64_t defaultBytes() const override { return default_bytes; }
   bool has(uint32_t brick) const override { return bricks.has(brick); }
-  void put(uint32_t brick, const GeometryArrays<const float>& geometry,
-           const VariableArrays<const float>& values, const BrickPieces& pieces) override {
+  void put(uint32_t brick, const GeometryArrays<const float>& geometry, const BrickValues& values,
+           const BrickPieces& pieces) override {
     bricks.put(brick, geometry, values, pieces);
   }
   void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,

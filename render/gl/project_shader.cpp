@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "render/gl/project_pieces.h"
 #include "render/gl/splat_shader.h"
-#include "render/project/record_tags.h"
 #include "render/project/screen_splat.h"
 #include "render/project/tile_key.h"
 #include "stream/model/border_code.h"
@@ -17,12 +17,17 @@ constexpr const char* kInputs = R"(
 layout(local_size_x = THREADS) in;
 layout(std430, binding = 0) writeonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
 layout(std430, binding = 1) readonly buffer Bricks { uint words[]; };
-layout(std430, binding = 2) readonly buffer Parts { uvec4 parts[]; };    // five a ShaderPart
+layout(std430, binding = 2) readonly buffer Parts { uvec4 parts[]; };    // PART_VECTORS a ShaderPart
 layout(std430, binding = 3) readonly buffer Groups { uvec4 groups[]; };  // ShaderGroup
-layout(std430, binding = 4) buffer Fates { uint fates[]; };              // off screen, transparent, drawn, in pieces
+layout(std430, binding = 4) buffer Fates { uint fates[]; };              // off screen, transparent, drawn, in pieces, clipped, hidden
 layout(std430, binding = 5) readonly buffer Frames { float frames[]; };  // growthFrames()
+layout(std430, binding = 7) readonly buffer Shading { float shading[]; };  // GradientOpacity, ShadowGrid
+uniform uint steepness_points;  // of GradientOpacity: magnitude and factor each; 0: none
+uniform ivec3 lattice_nodes;    // of ShadowGrid, behind those; 0: none
+uniform vec4 nodes_per_unit;
 uniform uint group_count;
 uniform uint groups_of_splats;  // the others are of splats in pieces
+uniform uint stored_arrays;     // of a brick
 uniform float reach;  // of SplatChooser
 uniform bool per_pixel;
 uniform float largest_scalar;
@@ -42,7 +47,7 @@ uniform vec4 viewer;      // orthographic: the direction towards it
 uniform vec4 scale;
 uniform float key_steps;
 uniform float key_steps_a_pixel;
-shared uint group_fates[4];
+shared uint group_fates[FATES];
 )";
 
 constexpr const char* kProject = R"(
@@ -116,13 +121,49 @@ uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
   return packSkew(t);
 }
 
-// This is LocalLight::of(): diffuse and specular. `towards_viewer` has unit length.
-vec2 litBy(vec3 w, vec3 axis, vec3 shear, vec3 towards_viewer) {
+// As in gradient_opacity.h.
+vec3 gradientOf(vec3 w, vec3 axis, vec3 shear) {
   vec3 g;
   g.z = w.z / axis.z;
   g.y = w.y / axis.y - shear.z * g.z;
   g.x = w.x / axis.x - shear.x * g.y - shear.y * g.z;
-  g /= scale.xyz;
+  return g / scale.xyz;
+}
+
+// This is GradientOpacity::of().
+float opacityOf(vec3 gradient) {
+  if (steepness_points == 0u) return 1.0;
+  float magnitude = length(gradient);
+  uint first = 0u, end = steepness_points;  // the first that is not less
+  while (first < end) {
+    uint middle = (first + end) / 2u;
+    if (shading[2u * middle] < magnitude)
+      first = middle + 1u;
+    else
+      end = middle;
+  }
+  if (first == 0u) return shading[1];
+  uint before = 2u * first - 2u;
+  if (first == steepness_points) return shading[before + 1u];
+  float part = (magnitude - shading[before]) / (shading[before + 2u] - shading[before]);
+  return shading[before + 1u] + part * (shading[before + 3u] - shading[before + 1u]);
+}
+
+// This is LocalShadows::at().
+float arrivingAt(uint p, vec3 position) {
+  if (lattice_nodes.x == 0) return 1.0;
+  vec3 last = vec3(lattice_nodes - 1), at = uintBitsToFloat(parts[p + 5u].xyz) + nodes_per_unit.xyz * position;
+  vec3 inside = clamp(at, vec3(0.0), last), node = min(floor(inside), last - 1.0), part = inside - node;
+  ivec3 corner = ivec3(node);
+  int row = lattice_nodes.x, layer = row * lattice_nodes.y, from = 2 * int(steepness_points) + corner.z * layer + corner.y * row + corner.x;
+  vec4 along = mix(vec4(shading[from], shading[from + row], shading[from + layer], shading[from + layer + row]),
+                   vec4(shading[from + 1], shading[from + row + 1], shading[from + layer + 1], shading[from + layer + row + 1]), part.x);
+  vec2 sides = mix(along.xz, along.yw, part.y);
+  return mix(sides.x, sides.y, part.z);
+}
+
+// This is LocalLight::of(): diffuse and specular. `towards_viewer` has unit length.
+vec2 litBy(vec3 g, vec3 towards_viewer) {
   float squared = dot(g, g);
   if (!(squared > 0.0 && squared < 1e36)) return vec2(1.0, 0.0);
   float strength = squared / (squared + light.w), inverse = inversesqrt(squared);
@@ -180,8 +221,8 @@ uint firstKey(vec2 at, Ellipse e, inout uint key, inout vec2 slope) {
 // The place of a splat on the screen, and the map that is linear there: a PlacedPiece, with its depth as BrickProjector::depths().
 struct Place {
   vec2 pixel;
-  float depth, volume;
-  vec3 row0, row1, to_depth;
+  float depth, volume, layer_depth;  // layer_depth: as PixelLayers count it
+  vec3 row0, row1, to_depth, depth_row;
 };
 
 Place placeOf(uint p, vec3 position) {
@@ -195,7 +236,10 @@ Place placeOf(uint p, vec3 position) {
   place.row0 = focal / c.z * (right.xyz - tangent.x * forward.xyz);
   place.row1 = focal / c.z * (down.xyz - tangent.y * forward.xyz);
   place.to_depth = focal / c.z * forward.xyz;
-  place.volume = volume * focal * focal * length(c) / (c.z * c.z * c.z);
+  float distance = length(c);
+  place.volume = volume * focal * focal * distance / (c.z * c.z * c.z);
+  place.layer_depth = distance;
+  place.depth_row = (c.x * right.xyz + c.y * down.xyz + c.z * forward.xyz) / max(distance, 1e-30);
 #else
   place.row0 = right.xyz;
   place.row1 = down.xyz;
@@ -203,6 +247,8 @@ Place placeOf(uint p, vec3 position) {
   place.pixel = uintBitsToFloat(parts[p + 1u].zw) + vec2(dot(place.row0, position), dot(place.row1, position));
   place.depth = dot(forward.xyz, position);
   place.volume = volume;
+  place.layer_depth = place.depth + uintBitsToFloat(parts[p + 4u].w);
+  place.depth_row = forward.xyz;
 #endif
   return place;
 }
@@ -262,153 +308,19 @@ uint choose(uint slot, uint p, Place at, Projected splat) {
   return 2u;
 }
 
-vec2 litAt(uint p, vec3 position, vec3 w, vec3 axis, vec3 shear) {
+vec2 litAt(uint p, vec3 position, vec3 gradient) {
   if (!lit) return vec2(1.0, 0.0);
 #if PERSPECTIVE
   vec3 towards_viewer = normalize(uintBitsToFloat(parts[p + 3u].yzw) - scale.xyz * position);
 #else
   vec3 towards_viewer = viewer.xyz;
 #endif
-  return litBy(w, axis, shear, towards_viewer);
+  return arrivingAt(p, position) * litBy(gradient, towards_viewer);
 }
 
 // A record, which is not drawn.
 void writeNothing(uint slot) {
   splats[slot] = uvec4(0u, 0u, floatBitsToUint(-1.0), 0u);
-}
-
-// Returns which of `fates` counts it.
-uint project(uvec4 group, uint thread) {
-  uint slot = 4u * (group.w + thread), p = 5u * group.x;
-  uint n = parts[p].y, at = parts[p].x + group.y + thread;
-  writeNothing(slot);
-  if (words[at + 10u * n] != NO_BORDER) return 3u;  // it is drawn in pieces
-  vec3 position = vec3(OF(0), OF(1), OF(2)), axis = vec3(OF(3), OF(4), OF(5)), shear = vec3(OF(6), OF(7), OF(8));
-  vec3 w = vec3(OF(13), OF(14), OF(15));
-  mat3 a = factorOf(axis, shear);
-  Place place = placeOf(p, position);
-  vec3 b0 = rowOf(place.row0, a), b1 = rowOf(place.row1, a);
-  Ellipse e = ellipseOf(b0, b1, w, OF(16), OF(9) * place.volume);
-  uint skew = skewOf(words[at + 11u * n], vec2(b0.x, b1.x), vec2(b0.y, b1.y), vec2(b0.z, b1.z), e);
-  vec2 slope = planeOf(b0, b1, rowOf(place.to_depth, a));
-  return choose(slot, p, place, Projected(e, OF(12), skew, slope, litAt(p, position, w, axis, shear), false));
-}
-
-vec4 fourAt(uint word) {
-  return uintBitsToFloat(uvec4(words[word], words[word + 1u], words[word + 2u], words[word + 3u]));
-}
-
-// This is the result of cutAtFaces(); plane_cuts.cpp explains it.
-struct Cut {
-  bool nothing;  // is left
-  int count;     // of the faces that cut
-  mat3 faces;    // a face a column
-  uint far_sides;
-};
-
-Cut cutAt(vec3 b0, vec3 b1, Ellipse e, uint piece, uint counts) {
-  Cut cut = Cut(false, 0, mat3(NO_FACE, 0.0, 0.0, NO_FACE, 0.0, 0.0, NO_FACE, 0.0, 0.0), 0u);
-  vec3 n = cross(b0, b1);
-  float s = dot(b0, b0) + dot(b1, b1), determinant = dot(n, n) + low_pass_px2 * (s + low_pass_px2);
-  for (uint f = 0u; f < (counts & 255u); ++f) {
-    vec4 face = fourAt(piece + 16u + 4u * f);
-    vec3 q = face.xyz, m = cross(n, q), c0 = cross(b0, q), c1 = cross(b1, q);
-    float h0 = dot(b0, q), h1 = dot(b1, q), nq = dot(n, q);
-    float g0 = (dot(b1, m) + low_pass_px2 * h0) / determinant, g1 = (low_pass_px2 * h1 - dot(b0, m)) / determinant;
-    float unseen = (low_pass_px2 * (low_pass_px2 * dot(q, q) + dot(c0, c0) + dot(c1, c1)) + nq * nq) / determinant;
-    if ((counts >> (8u + f) & 1u) != 0u && unseen > 0.5) continue;
-    vec3 at = vec3(face.w, e.l11 * g0 + e.l21 * g1, e.l22 * g1) / (KERNEL_SIGMA * sqrt(unseen));
-    float spread = SUPPORT * length(at.yz);
-    if (at.x + spread <= -CUT_REACH) cut.nothing = true;
-    if (at.x - spread >= CUT_REACH) continue;
-    if (nq > 0.0) cut.far_sides |= 1u << cut.count;
-    cut.faces[cut.count++] = at;
-  }
-  return cut;
-}
-
-float shareBelow(float x) {
-  return x * (0.9375 + x * x * (-0.625 + 0.1875 * x * x));
-}
-float shareAtCentre(Cut cut) {
-  float lo = -1.0, hi = 1.0;
-  for (int f = 0; f < 3; ++f) {
-    float at = cut.faces[f].x / CUT_REACH;
-    if ((cut.far_sides >> f & 1u) != 0u)
-      lo = max(lo, -at);
-    else
-      hi = min(hi, at);
-  }
-  return max(0.0, shareBelow(min(hi, 1.0)) - shareBelow(min(lo, 1.0)));
-}
-
-// A splat that is drawn in pieces: as choosePieces() and keepScalarOf() in projection.cpp. Returns which of `fates` counts it.
-uint projectPieces(uvec4 group, uint thread) {
-  uint p = 5u * group.x, n = parts[p].y, table = parts[p].x + STORED_ARRAYS * n, own = table + 4u * (group.y + thread);
-  uint first = words[own + 1u], count = words[own + 2u];
-  uint slot = 4u * (group.w + PIECE_ELEMENTS * (first - words[table + 4u * group.y + 1u]));
-  for (uint k = 0u; k < PIECE_ELEMENTS * count; ++k) writeNothing(slot + 4u * k);
-  uint at = parts[p].x + words[own];
-  vec3 position = vec3(OF(0), OF(1), OF(2)), axis = vec3(OF(3), OF(4), OF(5)), shear = vec3(OF(6), OF(7), OF(8));
-  vec3 w = vec3(OF(13), OF(14), OF(15));
-  float mean = OF(12), variance = OF(16), weight = OF(9), drawn = uintBitsToFloat(words[own + 3u]);
-  float most = reach * drawn + CUT_REACH * sqrt(drawn * drawn + variance);
-  if (isTransparent(mean - most, mean + most)) return 1u;
-  mat3 a = factorOf(axis, shear);
-  Place whole = placeOf(p, position);
-  vec2 slope = planeOf(rowOf(whole.row0, a), rowOf(whole.row1, a), rowOf(whole.to_depth, a));
-  vec2 lit_by = litAt(p, position, w, axis, shear);
-  uint best = 0u, piece = table + 4u * parts[p + 4u].x + 40u * first;
-  for (uint k = 0u; k < count; ++k, piece += 40u, slot += 4u * PIECE_ELEMENTS) {
-    vec4 q0 = fourAt(piece), q1 = fourAt(piece + 4u), q2 = fourAt(piece + 8u), q3 = fourAt(piece + 12u);
-    uint counts = words[piece + 11u];
-    mat3 factor = factorOf(q1.xyz, q2.xyz);
-    Place place = placeOf(p, q0.xyz);
-    vec3 b0 = rowOf(place.row0, factor), b1 = rowOf(place.row1, factor);
-    Ellipse e = ellipseOf(b0, b1, q3.xyz, variance, q1.w * place.volume);
-    Cut cut = cutAt(b0, b1, e, piece, counts);
-    if (cut.nothing) continue;
-    vec4 t = vec4(0.0);
-    for (uint g = 0u; g < (counts >> 16 & 255u); ++g) {
-      vec4 growth = fourAt(piece + 28u + 4u * g);
-      t += skewOfAxis(vec2(dot(place.row0, growth.xyz), dot(place.row1, growth.xyz)), growth.w, e);
-    }
-    float piece_mean = q0.w;
-    if (cut.count > 0) {  // its scalar stays that of the cell
-      Ellipse cell = ellipseAt(place, a, w, variance, weight);
-      vec2 off = -vec2(dot(place.row0, position - q0.xyz), dot(place.row1, position - q0.xyz));
-      float by_y = cell.slope1 / cell.l22, by_x = (cell.slope0 - cell.l21 * by_y) / cell.l11;
-      piece_mean = mean + by_x * off.x + by_y * off.y;
-      e.slope0 = e.l11 * by_x + e.l21 * by_y;
-      e.slope1 = e.l22 * by_y;
-      e.half_width = cell.half_width;
-      e.along = cell.along * shareAtCentre(cut);
-    }
-    uint fate = choose(slot + 4u, p, place, Projected(e, piece_mean, packSkew(t), slope, lit_by, cut.count > 0));
-    if (fate == 2u && cut.count > 0) {  // as ScreenCut::record()
-      float tag = -(FAR_SIDES_TAG * float(cut.far_sides) + CUT_TAG);
-      splats[slot] = floatBitsToUint(vec4(cut.faces[0].xy, tag, cut.faces[0].z));
-      splats[slot + 1u] = floatBitsToUint(vec4(cut.faces[1], cut.faces[2].x));
-      splats[slot + 2u] = uvec4(floatBitsToUint(cut.faces[2].yz), 0u, 0u);
-    }
-    best = max(best, fate);
-  }
-  return best;
-}
-
-void main() {
-  uint thread = gl_LocalInvocationID.x, number = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x;
-  if (thread < 4u) group_fates[thread] = 0u;
-  memoryBarrierShared();
-  barrier();
-  uvec4 group = number < group_count ? groups[number] : uvec4(0u);
-  if (thread < group.z) {
-    uint fate = number < groups_of_splats ? project(group, thread) : projectPieces(group, thread);
-    atomicAdd(group_fates[fate], 1u);
-  }
-  memoryBarrierShared();
-  barrier();
-  if (thread < 4u && group_fates[thread] > 0u) atomicAdd(fates[thread], group_fates[thread]);
 }
 )";
 
@@ -427,13 +339,11 @@ std::string projectShader(bool perspective) {
       "#define SKEW_OF_GROWTH {:.9g}\n#define MOST_KEY {}\n",
       kGrowthFrameShift, (1u << kGrowthFrameBits) - 1, kGrowthBits, kGrowthStep, kSkewOfGrowth,
       INT32_MAX / 2);
-  const std::string pieces = fmt::format(
-      "#define STORED_ARRAYS {}u\n#define PIECE_ELEMENTS {}u\n#define NO_FACE {:.1f}\n#define CUT_REACH "
-      "{:.9g}\n"
-      "#define CUT_TAG {:.1f}\n#define FAR_SIDES_TAG {:.1f}\n",
-      kStoredArrays, kElementsAPiece, ScreenCut::kNoFace, ScreenCut::kReach, kCutTag, kFarSidesTag);
-  return fmt::format("#version 430 core\n{}{}{}{}{}{}", constants, growth, pieces, splatUniforms(), kInputs,
-                     kProject);
+  const std::string sizes =
+      fmt::format("#define PART_VECTORS {}u\n#define FATES {}u\n#define CUT_REACH {:.9g}\n",
+                  sizeof(ShaderPart) / 16, kFates, ScreenCut::kReach);
+  return fmt::format("#version 430 core\n{}{}{}{}{}{}{}{}", constants, growth, sizes, splatUniforms(),
+                     kInputs, pieceInputs(), kProject, pieceFunctions());
 }
 
 }  // namespace curvisplat

@@ -14,7 +14,7 @@ namespace curvisplat {
 namespace {
 
 constexpr int kFootprintSteps = 1024;
-constexpr GLint kFootprintUnit = 0, kClassesUnit = 1, kLayersUnit = 2, kColoursUnit = 3;
+constexpr GLint kFootprintUnit = 0, kClassesUnit = 1, kLayersUnit = 2, kColoursUnit = 3, kLayerBoundsUnit = 4;
 
 float mostExtinction(const ClassificationTable& table) {
   float most = std::max(table.below().w, table.above().w);
@@ -51,7 +51,12 @@ void TableTexture::fill(const GlFunctions& gl, GLint unit, GLenum format, std::s
 }
 
 SplatTables::SplatTables(const GlFunctions& gl)
-    : gl_(gl), footprint_(gl), classes_(gl), colours_(gl), layers_texture_(makeTexture(gl)) {
+    : gl_(gl),
+      footprint_(gl),
+      classes_(gl),
+      colours_(gl),
+      layer_bounds_(gl),
+      layers_texture_(makeTexture(gl)) {
   footprint_.fill(gl, kFootprintUnit, GL_RG32F, footprintTexels());
 }
 
@@ -81,6 +86,9 @@ void SplatTables::loadLayers() {
   gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, size_.width, size_.height, 0, GL_RGBA, GL_FLOAT,
                  depths.data());
+  const std::vector<PixelLayers::Bounds> bounds = layers_->allBounds();
+  static_assert(sizeof(PixelLayers::Bounds) == 2 * sizeof(float));
+  layer_bounds_.fill(gl_, kLayerBoundsUnit, GL_RG32F, {&bounds.data()->nearest, 2 * bounds.size()});
   gl_.check("loading the depths of surfaces");
 }
 
@@ -117,6 +125,7 @@ void SplatTables::use(const GlProgram& program) const {
   set("cells_from_scalar", "below", "above", *table_);
   // A buffer's texture is never left at the unit of another kind, of a sampler that is not used either.
   gl_.Uniform1i(program.uniform("colours"), kColoursUnit);
+  gl_.Uniform1i(program.uniform("layer_bounds"), kLayerBoundsUnit);
   if (!shading_.colours) return;
   gl_.Uniform1i(program.uniform("colour_log_scale"), shading_.colours->logScale() ? 1 : 0);
   set("cells_from_colour", "colours_below", "colours_above", *shading_.colours);

@@ -46,7 +46,7 @@ class SplatTables {
   void loadLayers();
 
   const GlFunctions& gl_;
-  TableTexture footprint_, classes_, colours_;
+  TableTexture footprint_, classes_, colours_, layer_bounds_;
   GlObject layers_texture_;
   ImageSize size_{0, 0};
   const ClassificationTable* table_ = nullptr;

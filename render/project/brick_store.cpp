@@ -79,19 +79,21 @@ BrickPieces BrickPieces::of(const GeometryArrays<const float>& geometry,
   return {{}, {}, true};
 }
 
-bool BrickStore::canDraw(const ProjectionSettings& settings) {
-  return !settings.layers && !settings.gradient && !settings.shadows;
+uint32_t BrickStore::clipsOf(const Brick& brick, const ProjectionSettings& settings) {
+  const glm::dvec3 middle = 0.5 * (brick.lower + brick.upper), extent = 0.5 * (brick.upper - brick.lower);
+  uint32_t clips = 0;
+  for (size_t n = 0; n < settings.clip_planes.size(); ++n) {
+    const ClipPlane& plane = settings.clip_planes[n];
+    const glm::dvec3 normal = glm::normalize(plane.normal);
+    const bool is_inside = glm::dot(normal, middle - plane.point) - glm::dot(glm::abs(normal), extent) >
+                           1.01 * brick.largest_radius;  // but for rounding
+    if (!is_inside) clips |= 1u << n;
+  }
+  return clips;
 }
 
-bool BrickStore::canDraw(const Brick& brick, const glm::dvec3& cell_min, const ProjectionSettings& settings) {
+bool BrickStore::canDraw(const Brick& brick, const glm::dvec3& cell_min, const ScreenView& view) {
   const glm::dvec3 middle = 0.5 * (brick.lower + brick.upper), extent = 0.5 * (brick.upper - brick.lower);
-  const auto is_inside = [&](const ClipPlane& plane) {
-    const glm::dvec3 normal = glm::normalize(plane.normal);
-    return glm::dot(normal, middle - plane.point) - glm::dot(glm::abs(normal), extent) >
-           1.01 * brick.largest_radius;  // but for rounding
-  };
-  if (!std::all_of(settings.clip_planes.begin(), settings.clip_planes.end(), is_inside)) return false;
-  const ScreenView& view = settings.view;
   if (view.projection == Projection::kOrthographic) return true;
   constexpr double kOfPieces = 1.25;  // pieces at edges may be larger than their splats
   const double radius =

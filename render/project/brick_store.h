@@ -3,9 +3,10 @@
 //
 //   makeRoom -> put what is missing -> Painter::begin -> drawStored -> draw ... -> end
 //
-// The store makes the splats that BrickProjector would make, except for rounding, with the same keys. Splats at
-// borders are divided into pieces when a brick is put into the store (BrickPieces); this does not depend on the
-// view, and any thread may do it. All calls of a store are on the painter's thread.
+// The store makes the splats that BrickProjector would make, except for rounding, with the same keys and records:
+// cut by clip planes, at the layers of the pixels, and with the scalar of their colours. Splats at borders are
+// divided into pieces when a brick is put into the store (BrickPieces); this does not depend on the view, and any
+// thread may do it. All calls of a store are on the painter's thread.
 #pragma once
 
 #include <array>
@@ -29,9 +30,21 @@ struct StoredPart {
   SplatRanges ranges;
   glm::dvec3 cell_min;
   KeyRange keys;
+  uint32_t clips = 0;     // bit n: ProjectionSettings::clip_planes[n] may cut splats of the brick
+  bool layered = false;   // they may meet layers
+  bool coloured = false;  // in a picture of two scalars
+
+  /// The elements that one splat is drawn as at most: its records, then itself.
+  size_t elementsASplat() const { return 1 + (clips != 0 ? 1u : 0u) + otherRecords(); }
+  /// The same for a piece, which may have a ScreenCut in any picture.
+  size_t elementsAPiece() const { return 2 + otherRecords(); }
+
+ private:
+  size_t otherRecords() const { return (layered ? 1u : 0u) + (coloured ? 1u : 0u); }
 };
 
-/// A piece of a splat at a border as the card reads it, in ten vectors of four numbers.
+/// A piece of a splat at a border as the card reads it, in ten vectors of four numbers. Its own faces are at most
+/// kMaxFaces; clip planes add others when it is drawn.
 struct StoredPiece {
   static constexpr size_t kMaxFaces = 3;
 
@@ -66,8 +79,8 @@ class BrickStore {
  public:
   virtual ~BrickStore() = default;
 
-  /// Removes all bricks if `content` differs from the number given last. Each cache, step and variable has a
-  /// number of its own.
+  /// Removes all bricks if `content` differs from the number given last. Each cache, step, variable and pair of
+  /// variables has a number of its own.
   virtual void open(uint64_t content) = 0;
   /// Reserves space in `bytes` of the card's memory for the bricks of the parts and for their projected
   /// splats. Returns how many parts, from the first on, fit as far as the store knows: only a brick that was
@@ -80,14 +93,13 @@ class BrickStore {
   virtual bool has(uint32_t brick) const = 0;
   /// Adds a brick. Bricks that no part of the last makeRoom() needs may be evicted for it. If there is no free
   /// range for it all the same, the brick is not stored, which has() tells; the next makeRoom() empties the store.
-  virtual void put(uint32_t brick, const GeometryArrays<const float>& geometry,
-                   const VariableArrays<const float>& values, const BrickPieces& pieces) = 0;
-  /// Whether pictures with these settings can be drawn from a store. Those with layers, gradient opacity
-  /// or shadows cannot.
-  static bool canDraw(const ProjectionSettings& settings);
-  /// Whether the brick can be drawn from a store in such a picture: neither clip planes nor perspective may
-  /// cut its splats. Positions of its splats are relative to `cell_min`.
-  static bool canDraw(const Brick& brick, const glm::dvec3& cell_min, const ProjectionSettings& settings);
+  virtual void put(uint32_t brick, const GeometryArrays<const float>& geometry, const BrickValues& values,
+                   const BrickPieces& pieces) = 0;
+  /// Whether the brick can be drawn from a store in a picture of this view: perspective may not cut its splats.
+  /// Positions of its splats are relative to `cell_min`.
+  static bool canDraw(const Brick& brick, const glm::dvec3& cell_min, const ScreenView& view);
+  /// StoredPart::clips of the brick.
+  static uint32_t clipsOf(const Brick& brick, const ProjectionSettings& settings);
 
   /// Projects the parts, all of which are stored. Call it between begin() and the first draw() of the
   /// painter.

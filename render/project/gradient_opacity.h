@@ -57,6 +57,9 @@ class GradientOpacity {
   GradientOpacity(std::span<const OpacityPoint> points, const GradientPercentiles& percentiles);
 
   float of(float magnitude) const;
+  /// The ends of the linear pieces, and the factors there.
+  std::span<const float> magnitudes() const { return magnitudes_; }
+  std::span<const float> factors() const { return factors_; }
 
  private:
   std::vector<float> magnitudes_, factors_;

@@ -12,7 +12,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr int kCellSide = 8;
 constexpr float kClear = 1e-6f;
 
 }  // namespace
@@ -109,6 +108,12 @@ PixelLayers::Bounds PixelLayers::boundsOver(const ScreenBox& box) const {
       bounds.hidden = std::max(bounds.hidden, cell.hidden);
     }
   return bounds;
+}
+
+std::vector<PixelLayers::Bounds> PixelLayers::allBounds() const {
+  std::vector<Bounds> all;
+  for (const Level& level : levels_) all.insert(all.end(), level.cells.begin(), level.cells.end());
+  return all;
 }
 
 uint64_t PixelLayers::bytes() const {

@@ -45,6 +45,7 @@ class PixelLayers {
  public:
   static constexpr int kMaxLayers = 4, kMaxWindows = kMaxLayers + 1;
   static constexpr float kNowhere = std::numeric_limits<float>::infinity();
+  static constexpr int kCellSide = 8;  // pixels; of the smallest cells of boundsOver()
 
   /// The layers of a row of pixels, or of a piece of it, one pixel after the other.
   struct Row {
@@ -81,6 +82,9 @@ class PixelLayers {
     float nearest = kNowhere, hidden = -kNowhere;
   };
   Bounds boundsOver(const ScreenBox& box) const;
+  /// The bounds of all cells that boundsOver() looks at: row by row, those of kCellSide pixels first, then those of
+  /// twice the side, and so on up to one cell.
+  std::vector<Bounds> allBounds() const;
 
  private:
   struct Level {
@@ -93,7 +97,7 @@ class PixelLayers {
   double depth_origin_;
   std::vector<uint32_t> begins_;  // [pixels + 1], into layers_
   std::vector<PixelLayer> layers_;
-  std::vector<Level> levels_;  // cells of 8 x 8 pixels, then 16 x 16, ...
+  std::vector<Level> levels_;  // cells of kCellSide pixels, then twice as large, ...
   int windows_ = 1;
 };
 

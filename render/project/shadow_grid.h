@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -113,6 +114,9 @@ class ShadowGrid {
 
   LocalShadows local(const glm::dvec3& origin) const { return {lattice_, arriving_.data(), origin}; }
   float at(const glm::dvec3& data) const { return local(data).at(0, 0, 0); }
+  const ShadowLattice& lattice() const { return lattice_; }
+  /// [lattice().size()] the share that arrives at each node.
+  std::span<const float> arriving() const { return arriving_; }
   /// The damaged bricks, which cast no shadow, with one line each that says why.
   const std::vector<std::pair<uint32_t, std::string>>& damaged() const { return damaged_; }
 

@@ -16,6 +16,13 @@ namespace {
 constexpr float kEverywhere = std::numeric_limits<float>::infinity();
 constexpr double kRoundingPixels = 1;
 
+/// How far along the ray a splat of the brick reaches from its centre, at most.
+double reachAlongRay(const Brick& brick, const ScreenView& view) {
+  // Along the ray a splat's distribution reaches a little beyond its support (plane_cuts.h).
+  constexpr double kBeyond = double{kDepthReach} / kKernelSupport;
+  return kBeyond * brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
+}
+
 }  // namespace
 
 ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view) {
@@ -54,9 +61,16 @@ double nearestDepthOf(const Brick& brick, const ScreenView& view) {
                              ? glm::length(glm::clamp(view.eye, lower, upper) - view.eye)
                              : glm::dot(view.forward, 0.5 * (lower + upper) - view.eye) -
                                    glm::dot(glm::abs(view.forward), 0.5 * (upper - lower));
-  // Along the ray a splat's distribution reaches a little beyond its support (plane_cuts.h).
-  constexpr double kBeyond = double{kDepthReach} / kKernelSupport;
-  return nearest - kBeyond * brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
+  return nearest - reachAlongRay(brick, view);
+}
+
+double farthestDepthOf(const Brick& brick, const ScreenView& view) {
+  const glm::dvec3 lower = view.scale * brick.lower, upper = view.scale * brick.upper;
+  const double farthest = view.projection == Projection::kPerspective
+                              ? glm::length(glm::max(glm::abs(lower - view.eye), glm::abs(upper - view.eye)))
+                              : glm::dot(view.forward, 0.5 * (lower + upper) - view.eye) +
+                                    glm::dot(glm::abs(view.forward), 0.5 * (upper - lower));
+  return farthest + reachAlongRay(brick, view);
 }
 
 void HiddenBricks::begin(std::span<const Brick> bricks, const ScreenView& view) {

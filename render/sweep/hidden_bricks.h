@@ -38,5 +38,7 @@ ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view);
 
 /// No part of the brick's splats is nearer along the view; perspective: to the eye.
 double nearestDepthOf(const Brick& brick, const ScreenView& view);
+/// No part of them is farther.
+double farthestDepthOf(const Brick& brick, const ScreenView& view);
 
 }  // namespace curvisplat

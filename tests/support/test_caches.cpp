@@ -28,7 +28,7 @@ BrickSplats byOctant(const BrickSplats& brick) {
   for (size_t n = 0; n < order.size(); ++n) {
     sorted.positions[n] = brick.positions[order[n]];
     sorted.splats[n] = brick.splats[order[n]];
-    sorted.variables[0][n] = brick.variables[0][order[n]];
+    for (size_t v = 0; v < brick.variables.size(); ++v) sorted.variables[v][n] = brick.variables[v][order[n]];
     if (!brick.border_codes.empty()) sorted.border_codes[n] = brick.border_codes[order[n]];
   }
   return sorted;
@@ -62,13 +62,17 @@ uint32_t randomBorderCode(std::mt19937_64& random) {
 
 enum class Borders : uint8_t { kNone, kOfNodes, kOfCells };
 
-void writeRandom(const std::filesystem::path& path, uint64_t seed, size_t most_splats, Borders borders) {
+void writeRandom(const std::filesystem::path& path, uint64_t seed, size_t most_splats, Borders borders,
+                 size_t variables = 1) {
   const RootCube root{{-1, 2, 3}, 4};
-  CacheWriter writer(path, false, root, {{0, "f", "", -1, 1}});
+  std::vector<VariableInfo> infos{{0, "f", "", -1, 1}};
+  if (variables > 1) infos.push_back({1, "g", "", -1, 1});
+  CacheWriter writer(path, false, root, infos);
   std::mt19937_64 random(seed);
   RandomBrick like;
   like.unit = root.size;
   like.axis = 0.03;
+  like.variables = variables;
   const auto append = [&](const Cell& cell, bool leaf, float error) {
     like.leaf = leaf;
     like.splats = 1 + random() % (random() % 3 == 0 ? most_splats : most_splats / 20);
@@ -112,8 +116,9 @@ void writeRandomCache(const std::filesystem::path& path, uint64_t seed, size_t m
   writeRandom(path, seed, most_splats, Borders::kNone);
 }
 
-void writeRandomCacheWithBorders(const std::filesystem::path& path, uint64_t seed, bool cells) {
-  writeRandom(path, seed, 3000, cells ? Borders::kOfCells : Borders::kOfNodes);
+void writeRandomCacheWithBorders(const std::filesystem::path& path, uint64_t seed, bool cells,
+                                 size_t variables) {
+  writeRandom(path, seed, 3000, cells ? Borders::kOfCells : Borders::kOfNodes, variables);
 }
 
 namespace {

@@ -142,7 +142,9 @@ struct SmallCache {
 /// splats by octant and of their children's weight.
 void writeRandomCache(const std::filesystem::path& path, uint64_t seed = 1, size_t most_splats = 3000);
 /// The same, and a third of the splats lie at borders, with codes of all forms. `cells`: they are cells, drawn in pairs.
-void writeRandomCacheWithBorders(const std::filesystem::path& path, uint64_t seed, bool cells);
+/// `variables`: 1, or 2 scalars.
+void writeRandomCacheWithBorders(const std::filesystem::path& path, uint64_t seed, bool cells,
+                                 size_t variables = 1);
 
 inline constexpr int kLatticeSide = 32;  // cells along an axis: the data is the cube [0, 32]³
 inline constexpr int kLatticeBricks = 1 + 8 + 64;
