@@ -287,11 +287,36 @@ class ZarrStores(ModelFileTest):
                 (2, self.edit("temp/.zarray", shape=[3, 9, 17, 22]), "has 22 values along lon; expected 23"),
                 (2, lambda path: (path / "temp/.zarray").write_text("{"), "is not JSON"),
                 (2, lambda path: (path / "temp/0.0.0.0").write_bytes(b"123"), "has 3 bytes (expected 42228)"),
+                (2, self.edit("temp/.zarray", dimension_separator="/../../other."), "expected \".\" or \"/\""),
+                (3, self.edit("temp/zarr.json", chunk_key_encoding={"name": "default", "configuration": {"separator": "/../"}}),
+                 "expected \".\" or \"/\""),
                 (3, self.edit("temp/zarr.json", chunk_grid={"name": "rectilinear"}), "expected \"regular\""),
                 (3, self.edit("temp/zarr.json", shape=[3, -9, 17, 23]), "shape[1] is invalid"),
                 (3, lambda path: (path / "zarr.json").write_text("[" * 100), "deep")):
             self.assertIn(words, self.refusal(version, change))
         self.assertIn("give the store", self.info(str(self.store(2, "s.zarr").path / "temp"), fails=True))
+
+    def test_an_archive_that_overstates_its_members(self):
+        store = self.store(2, "o.zarr", dict(chunks=(1, 1, 1, 10)))
+        self.edit("temp/.zarray", shape=[3, 9, 17, 10**9])(store.path)
+        (store.path / "temp/9").write_bytes(b"")
+        archive = store.zip()
+        listed = bytearray(archive.read_bytes())
+        at = listed.rindex(b"temp/9") - 46  # its entry in the list of members, which has sizes after 20 bytes
+        listed[at + 20:at + 28] = bytes([0, 0, 0, 0xf0] * 2)
+        archive.write_bytes(listed)
+        self.assertIn("next to no chunks", self.info(str(archive), fails=True))
+
+    def test_many_missing_chunks(self):
+        """A search among those that were missing would take the square of their number."""
+        store = Store(self.folder / "m.zarr", 2)
+        for name, length, words in (("lon", 200, dict(units="degrees_east")), ("lat", 200, dict(units="degrees_north")), ("depth", 2, dict(units="m"))):
+            store.add(name, name, np.linspace(0, 40, length), **words)
+        store.add("temp", "depth lat lon", np.zeros((2, 200, 200)), chunks=(2, 200, 200))
+        self.edit("temp/.zarray", chunks=[1, 1, 1])(store.path)
+        (store.path / "temp/0.0.0").write_bytes(bytes(8))
+        block = self.info("m.zarr")["blocks"][0]
+        self.assertEqual([block[axis] for axis in ("ni", "nj", "nk")], [200, 200, 2])
 
     def test_truncated_and_changed_chunks(self):
         kinds = [(2, dict(codecs=("zlib",), chunks=(3, 9, 17, 8))), (2, dict(codecs=("blosc",))), (2, dict(codecs=("lz4",))), (2, {}),

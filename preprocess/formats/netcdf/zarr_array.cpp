@@ -95,6 +95,13 @@ std::vector<uint64_t> lengthsIn(const JsonField& field, uint64_t least) {
   return lengths;
 }
 
+/// The text between the numbers in a chunk's key. Any other could lead out of the store's folder.
+std::string separatorIn(const JsonField& field) {
+  std::string text = field.text();
+  if (text != "." && text != "/") field.fail("\".\" or \"/\"");
+  return text;
+}
+
 // ---- types ----
 
 struct NamedNumber {
@@ -396,7 +403,7 @@ ZarrArray zarrArray2(const std::string& name, std::string_view array_text, std::
     std::reverse(array.stored_axes.begin(), array.stored_axes.end());
   setType2(array, metadata.at("dtype").json());
   array.separator = ".";
-  if (const auto separator = metadata.find("dimension_separator")) array.separator = separator->text();
+  if (const auto separator = metadata.find("dimension_separator")) array.separator = separatorIn(*separator);
   if (const auto filters = metadata.find("filters"))
     for (const JsonField& filter : filters->elements(kMaxRank)) {
       const std::string id = filter.at("id").text();
@@ -439,7 +446,7 @@ ZarrNode zarrNode3(const std::string& name, std::string_view text, const std::st
   array.prefix = as_version2 ? "" : "c";
   array.separator = as_version2 ? "." : "/";
   if (const auto configuration = keys.find("configuration"); configuration && configuration->has("separator"))
-    array.separator = configuration->at("separator").text();
+    array.separator = separatorIn(configuration->at("separator"));
   addCodecs3(array, metadata.at("codecs"), false);
   if (const auto names = metadata.find("dimension_names"); names && names->size() == array.shape.size())
     for (const JsonField& dimension : names->elements())

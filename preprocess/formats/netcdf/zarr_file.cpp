@@ -293,15 +293,18 @@ std::shared_ptr<const ZarrFile::Bytes> ZarrFile::chunkAt(size_t number,
     cache.chunks.splice(cache.chunks.begin(), cache.chunks, found);
     return found->bytes;
   }
-  // A chunk of values of variable length counts as the most that it may take.
+  // A chunk of values of variable length counts as the most that it may take, small ones as more than their values: the list is
+  // searched from its beginning. What is missing is not listed, since a few bytes of metadata may declare any number of chunks.
+  constexpr size_t kEntryBytes = 1024;
   const ZarrArray& array = arrays_[number];
-  const size_t bytes = array.value_bytes == 0 ? kMaxTextBytes : array.chunkBytes();
+  const size_t bytes = kEntryBytes + (array.value_bytes == 0 ? kMaxTextBytes : array.chunkBytes());
   while (!cache.chunks.empty() && cache.bytes + bytes > kCacheBytes) {
-    if (cache.chunks.back().bytes) cache.bytes -= bytes;
+    cache.bytes -= bytes;
     cache.chunks.pop_back();
   }
   std::shared_ptr<const Bytes> chunk = loaded(array, at);
-  if (chunk) cache.bytes += bytes;
+  if (!chunk) return nullptr;
+  cache.bytes += bytes;
   cache.chunks.push_front({at, chunk});
   return chunk;
 }

@@ -38,8 +38,8 @@ class ZarrFile final : public NetcdfFile {
  private:
   using Bytes = std::vector<std::byte>;
   struct Chunk {
-    std::vector<uint64_t> at;            // [axis], in chunks
-    std::shared_ptr<const Bytes> bytes;  // null: not written
+    std::vector<uint64_t> at;  // [axis], in chunks
+    std::shared_ptr<const Bytes> bytes;
   };
   struct Cache {
     std::list<Chunk> chunks;  // the last used first

@@ -183,7 +183,8 @@ bool ZarrStore::hasBytes(const std::string& folder, double bytes) const {
     const std::string prefix = root_ + folder + '/';
     for (auto at = members_.lower_bound(prefix); at != members_.end() && at->first.starts_with(prefix); ++at)
       found += static_cast<double>(at->second.size);
-    return found >= bytes;
+    // The list of members may state any sizes.
+    return std::min(found, static_cast<double>(archive_->size())) >= bytes;
   }
   std::error_code error;
   for (fs::recursive_directory_iterator at(path_ / folder, error), end; !error && at != end && found < bytes;
