@@ -163,6 +163,27 @@ TEST_P(Trajectories, OfContiguousRaggedArrays) {
                                 "it has rowsize, mass, time, lon, lat, z");
 }
 
+TEST_P(Trajectories, MayHaveOneDepthEach) {
+  for (const size_t lines : {kLengths.size(), kPlaces + 1}) {  // fewer than observations, and more
+    {
+      NetcdfWriter file(path_, GetParam());
+      file.dimension("drifter", lines);
+      file.dimension("obs", kPlaces);
+      file.variable(
+          "rowsize", NetcdfNumbers::kInt32, {"drifter"}, {{"sample_dimension", "obs"}},
+          [](const Index& n) { return n[0] < kLengths.size() ? static_cast<double>(kLengths[n[0]]) : 0; });
+      file.variable("lon", kDouble, {"obs"}, {{"units", "degrees_east"}}, [](const Index&) { return 1.0; });
+      file.variable("lat", kDouble, {"obs"}, {{"units", "degrees_north"}}, [](const Index&) { return 1.0; });
+      file.variable("z", kDouble, {"drifter"}, {{"units", "m"}, {"positive", "down"}},
+                    [](const Index& n) { return depthOf(n[0], 0); });
+    }
+    const CfTrajectories read = readCfTrajectories(path_, "");
+    ASSERT_EQ(read.points.size(), kPlaces);
+    for (size_t at = 0; at < kPlaces; ++at)
+      EXPECT_NEAR(read.points[at].z, -1e-3 * depthOf(observations()[at].first, 0), 1e-12) << at;
+  }
+}
+
 TEST_P(Trajectories, OfIndexedRaggedArraysInAnyOrder) {
   // The places of all lines by turns, the last ones first.
   for (const char* const attribute : {"instance_dimension", "cf_role"}) {
@@ -207,6 +228,25 @@ TEST_P(Trajectories, WhatIsNoneIsRefused) {
   EXPECT_EQ(refusal(), path_.string() + ": rowsize is 3 for a trajectory; expected up to 2 observations");
   std::ofstream(path_) << "none";
   EXPECT_FALSE(isTrajectoryFile(path_));
+}
+
+TEST_P(Trajectories, AlongOneDimensionTwiceAreNone) {
+  const auto number = [](const Index& n) { return static_cast<double>(n[0]); };
+  const auto write = [&](const std::vector<std::string>& of_places,
+                         const std::vector<std::string>& of_times) {
+    NetcdfWriter file(path_, GetParam());
+    file.dimension("obs", 3);
+    file.variable("lon", kDouble, of_places, {{"units", "degrees_east"}}, number);
+    file.variable("lat", kDouble, of_places, {{"units", "degrees_north"}}, number);
+    file.variable("time", kDouble, of_times, {{"units", "hours since 2001-01-01"}}, number);
+  };
+  write({"obs", "obs"}, {"obs"});
+  EXPECT_EQ(
+      refusal(),
+      path_.string() +
+          ": has no trajectories: no longitude and latitude, or x and y, of one or two common dimensions");
+  write({"obs"}, {"obs", "obs"});
+  EXPECT_TRUE(readCfTrajectories(path_, "").times.empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, Trajectories,

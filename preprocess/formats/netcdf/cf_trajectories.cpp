@@ -118,7 +118,8 @@ class TrajectoryReader {
     }
     along_dim_ = dims[0];
     const std::string& name = files_.dimensions()[dims[0]].name;
-    if ((counts_ = withAttribute("sample_dimension", name)) && counts_->dims.size() == 1) return;
+    if ((counts_ = withAttribute("sample_dimension", name)) && counts_->dims.size() == 1 && counts_->dims != dims)
+      return;
     counts_ = nullptr;
     const NetcdfVariable* const id = withIds();
     for (const NetcdfVariable& variable : files_.variables())
@@ -136,9 +137,9 @@ class TrajectoryReader {
   /// Whether a variable has values of the observations, or of the lines.
   bool isObserved(const NetcdfVariable& variable) const {
     if (!variable.numeric || variable.dims.empty()) return false;
-    return std::all_of(variable.dims.begin(), variable.dims.end(), [&](size_t dim) {
-      return dim == along_dim_ || dim == line_dim_ || (counts_ && dim == counts_->dims[0]);
-    });
+    if (counts_ && variable.dims == counts_->dims) return true;
+    return std::all_of(variable.dims.begin(), variable.dims.end(),
+                       [&](size_t dim) { return dim == along_dim_ || dim == line_dim_; });
   }
 
   void findFurther() {
@@ -168,10 +169,21 @@ class TrajectoryReader {
     if (time_) result_.time_unit = {time_.variable->text("units"), time_.variable->text("calendar")};
   }
 
-  /// Values of lines and places along them, [line][place]; of ragged arrays `lines` is {0, 1}.
+  /// Whether a contiguous ragged array has one value of a line, as it has one count.
+  bool isOfCounts(const Observed& of) const { return counts_ && of && !has(*of.variable, *along_dim_); }
+  /// These values; empty if there are none.
+  std::vector<double> valuesOfCounts(const Observed& of) const {
+    if (!isOfCounts(of)) return {};
+    std::vector<double> values(lengthOf(counts_->dims[0]));
+    files_.read(*of.variable, {{0}, {values.size()}}, values);
+    for (double& value : values) value *= of.factor;
+    return values;
+  }
+
+  /// Values of lines and places along them, [line][place]; of ragged arrays `lines` is {0, 1}, and values of their lines are left out.
   std::vector<double> valuesOf(const Observed& of, const Range& lines, const Range& along) const {
     const size_t count = lines.size() * along.size();
-    if (!of) return std::vector<double>(count, 0.0);
+    if (!of || isOfCounts(of)) return std::vector<double>(count, 0.0);
     NetcdfBox box;
     for (const size_t dim : of.variable->dims) {
       const Range& range = dim == line_dim_ ? lines : along;
@@ -199,9 +211,7 @@ class TrajectoryReader {
   std::vector<Observation> observations(const Range& lines, const Range& along) const {
     const std::vector<double> x = valuesOf(x_, lines, along), y = valuesOf(y_, lines, along),
                               z = valuesOf(height_, lines, along), time = valuesOf(time_, lines, along);
-    const bool of_lines = counts_ && scalar_ && !has(*scalar_.variable, *along_dim_);
-    const std::vector<double> values =
-        of_lines ? std::vector<double>(x.size()) : valuesOf(scalar_, lines, along);
+    const std::vector<double> values = valuesOf(scalar_, lines, along);
     std::vector<Observation> all(x.size());
     for (size_t n = 0; n < all.size(); ++n) {
       const bool there = result_.degrees
@@ -213,6 +223,11 @@ class TrajectoryReader {
                 static_cast<float>(values[n])};
     }
     return all;
+  }
+
+  static void setHeight(Observation& one, double kilometres) {
+    one.place.z = kilometres;
+    if (!(std::abs(kilometres) <= kMaxKilometres)) one.place.x = std::numeric_limits<double>::quiet_NaN();
   }
 
   void readLines(const Range& lines, size_t along) {
@@ -236,15 +251,8 @@ class TrajectoryReader {
 
   /// Ragged arrays: the places of all lines along one dimension, by counts or by the numbers of lines.
   void readRagged(size_t along) {
-    std::vector<double> counts, of_lines;
-    if (counts_) {
-      counts.resize(lengthOf(counts_->dims[0]));
-      files_.read(*counts_, {{0}, {counts.size()}}, counts);
-      if (scalar_ && !has(*scalar_.variable, *along_dim_)) {
-        of_lines.resize(counts.size());
-        files_.read(*scalar_.variable, {{0}, {counts.size()}}, of_lines);
-      }
-    }
+    const std::vector<double> counts = valuesOfCounts({counts_}), scalars = valuesOfCounts(scalar_),
+                              heights = valuesOfCounts(height_);
     std::map<double, std::vector<Observation>> lines;
     size_t line = 0, left = 0;
     const auto nextLine = [&] {
@@ -268,7 +276,8 @@ class TrajectoryReader {
           if (!nextLine()) break;  // what no trajectory counts
           --left;
           number = static_cast<double>(line - 1);
-          if (!of_lines.empty()) read[n].value = static_cast<float>(of_lines[line - 1]);
+          if (!scalars.empty()) read[n].value = static_cast<float>(scalars[line - 1]);
+          if (!heights.empty()) setHeight(read[n], heights[line - 1]);
         }
         if (!std::isnan(number)) addTo(lines[number], {&read[n], 1});
       }

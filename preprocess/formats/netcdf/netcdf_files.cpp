@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <set>
 #include <utility>
 
 #include "preprocess/formats/common/text_reader.h"
@@ -140,6 +141,8 @@ void NetcdfFiles::add(size_t number) {
     NetcdfVariable& added = variables_.emplace_back(variable);
     added.file = number;
     for (size_t& dim : added.dims) dim = merged.at(dim);
+    // What has one dimension twice, f(x, x), is no samples of a grid, and no coordinate.
+    if (std::set(added.dims.begin(), added.dims.end()).size() < added.dims.size()) added.numeric = false;
   }
   if (twice.empty()) return;
   warnings_.push_back(fmt::format("left out: {} of {}: an earlier file has the same variables",

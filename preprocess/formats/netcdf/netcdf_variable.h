@@ -33,7 +33,7 @@ struct NetcdfVariable {
   size_t position = 0;       // index into its NetcdfFile::variables()
   int type = 0;              // as stored, an nc_type
   size_t value_bytes = 0;    // size of a stored value
-  bool numeric = false;      // neither text nor a user-defined type
+  bool numeric = false;      // neither text nor a user-defined type, nor f(x, x)
   std::vector<size_t> dims;  // indices into NetcdfFile::dimensions(), slowest first
   std::map<std::string, NetcdfAttribute> attributes;
 
