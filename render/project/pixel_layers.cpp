@@ -93,6 +93,8 @@ void PixelLayers::makeLevels() {
 }
 
 PixelLayers::Bounds PixelLayers::boundsOver(const ScreenBox& box) const {
+  // No numbers, of a splat larger than single precision: its layers may lie anywhere.
+  if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return {-kNowhere, kNowhere};
   const auto cellOf = [](float at, int pixels) {
     return static_cast<int>(std::clamp(at, 0.0f, static_cast<float>(pixels - 1))) / kCellSide;
   };

@@ -288,6 +288,16 @@ TEST_F(SurfaceOptions, LinesAreTheSameFromEveryFormat) {
   expectSays(damaged("NumberOfLines=\"2\"", ""), "has no lines; --points draws the points of a file");
 }
 
+TEST_F(SurfaceOptions, AreDrawnThoughSplatsAreLargerThanSinglePrecision) {
+  for (const Words& look : {Words{"--zoom", "1e25"}, Words{"--parallel-scale", "1e-30"}})
+    for (const Words& what :
+         {Words{"--slice", "4,0,2,0,1,0"}, Words{"--surface", "kmin"}, Words{"--iso", "0.3"}}) {
+      const Image image = picture(look + what);
+      EXPECT_TRUE(
+          std::all_of(image.rgba.begin(), image.rgba.end(), [](float c) { return std::isfinite(c); }));
+    }
+}
+
 TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
   const ProgramResult result = run(render({"--slice", "0,0,900,0,0,1"}));
   EXPECT_TRUE(result.err.find("warning: --slice 0,0,900,0,0,1 misses the data, which lies in x ") !=
