@@ -277,6 +277,11 @@ TEST_F(SurfaceOptions, LinesAreTheSameFromEveryFormat) {
   expectSays(refusal({"--lines", file("none.csv")}), "none.csv: ");
   expectSays(refusal({"--lines", file("lines.csv"), "--line-width", "thin"}), "--line-width");
   expectSays(refusal({"--lines-by", "height"}), "--lines-by needs lines or points: --lines FILE");
+  expectSays(refusal({"--lines-opacity", "0.5"}), "--lines-opacity needs lines or points: --lines FILE");
+  expectSays(refusal({"--points", file("lines.csv"), "--line-width", "9px"}),
+             "--line-width needs lines: --lines FILE");
+  expectSays(refusal({"--lines", file("lines.csv"), "--point-size", "9px"}),
+             "--point-size needs points: --points FILE");
   const auto damaged = [&](const std::string& from, const std::string& to) {
     std::string text = readTextFile(file("lines.vtp"));
     text.replace(text.find(from), from.size(), to);
@@ -316,6 +321,7 @@ TEST_F(SurfaceOptions, RefusesWrongUsage) {
       {{"--slice", "0,0,0,0,0,0"}, 2, "--slice 0,0,0,0,0,0: the normal nx,ny,nz has no direction"},
       {{"--slice", "0,0,0"}, 2, "--slice 0,0,0: expected px,py,pz,nx,ny,nz"},
       {{"--slice", "0,0,0,0,0,1", "--slice-opacity", "0"}, 2, "--slice-opacity 0: expected a number above 0"},
+      {{"--slice-opacity", "0.5"}, 2, "--slice-opacity needs a slice: --slice PX,PY,PZ,NX,NY,NZ"},
       {{"--volume", "off"},
        2,
        "--volume off leaves nothing to draw; give a --slice, a --surface, an --iso or --lines"},

@@ -375,6 +375,12 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
   } refused[] = {
       {{"--opacity-by", "x"}, 1, "--opacity-by: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
       {{"--opacity-range", "0,1"}, 2, "--opacity-range 0,1: needs --opacity-by NAME"},
+      {{"--opacity-by", "s0", "--opacity-range", "1,1"},
+       2,
+       ": --opacity-range 1,1: expected LO,HI with LO < HI"},
+      {{"--opacity-by", "s0", "--opacity-asinh", "1,0"},
+       2,
+       ": --opacity-asinh 1,0: expected a WIDTH above zero"},
       {{"--iso-by", "s1"}, 2, "--iso-by s1: needs an isosurface: --iso VALUE"},
       {{"--iso-by", "s1", "--iso", "0.5"}, 2, "add --opacity-by s1, or --volume off"},
       {{"--opacity-by", "s0", "--iso-by", "s1", "--iso", "0.5"}, 2, "a picture has two scalars"},

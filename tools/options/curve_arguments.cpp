@@ -192,6 +192,11 @@ void checkCurveArguments(const CurveArguments& arguments) {
   parseCurveOpacity(arguments.opacity);
   if (arguments.time) parseTimeShown(*arguments.time);
   for (const std::string& colour : arguments.colours) parseCurveColour(colour);
+  const CurveArguments otherwise;
+  if (arguments.lines.empty() && arguments.line_width != otherwise.line_width)
+    throw UsageError("--line-width needs lines: --lines FILE");
+  if (arguments.points.empty() && arguments.point_size != otherwise.point_size)
+    throw UsageError("--point-size needs points: --points FILE");
   const size_t files = arguments.lines.size() + arguments.points.size();
   if (arguments.colours.size() > 1 && arguments.colours.size() != files)
     throw UsageError("--lines-colour: given {} times for {} files; give it once, or once for each file",
@@ -200,6 +205,8 @@ void checkCurveArguments(const CurveArguments& arguments) {
   if (!arguments.colours.empty()) throw UsageError("--lines-colour needs lines or points: --lines FILE");
   if (!arguments.by.empty()) throw UsageError("--lines-by needs lines or points: --lines FILE");
   if (arguments.time) throw UsageError("--lines-time needs lines or points: --lines FILE");
+  if (arguments.opacity != otherwise.opacity)
+    throw UsageError("--lines-opacity needs lines or points: --lines FILE");
 }
 
 std::vector<Curves> curvesOf(const CurveArguments& arguments, const CacheReader& cache,

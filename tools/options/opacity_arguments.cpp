@@ -17,6 +17,7 @@ const std::string& nameOf(const OpacityArguments& arguments) {
 /// The arguments that the opacities' function is chosen from.
 ScalarArguments opacitiesOf(const OpacityArguments& arguments, const ScalarArguments& scalar) {
   ScalarArguments of = arguments.by;
+  of.prefix = "--opacity-";
   of.scalar = nameOf(arguments);
   of.opacity = scalar.opacity;
   of.opacity_unit = scalar.opacity_unit;

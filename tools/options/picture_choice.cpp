@@ -104,9 +104,16 @@ std::vector<OpacityPoint> opacitiesOf(const ScalarArguments& arguments) {
   return parseOpacities("--opacity", *arguments.opacity);
 }
 
-AsinhScale parseAsinh(const std::string& text) {
-  const auto numbers = parseNumbers("--asinh", text, "CENTRE,WIDTH");
-  if (!(numbers[1] > 0)) throw UsageError("--asinh {}: expected a WIDTH above zero", text);
+/// The name of one of the options that both scalars have.
+std::string optionOf(const ScalarArguments& arguments, const char* name) {
+  return std::string(arguments.prefix) + name;
+}
+
+/// Requires --asinh.
+AsinhScale parseAsinh(const ScalarArguments& arguments) {
+  const std::string option = optionOf(arguments, "asinh");
+  const auto numbers = parseNumbers(option, *arguments.asinh, "CENTRE,WIDTH");
+  if (!(numbers[1] > 0)) throw UsageError("{} {}: expected a WIDTH above zero", option, *arguments.asinh);
   return {numbers[0], numbers[1]};
 }
 
@@ -119,17 +126,18 @@ std::string exact(double number) {
 
 void checkFunctionArguments(const ScalarArguments& arguments) {
   opacitiesOf(arguments);
-  if (arguments.asinh) parseAsinh(*arguments.asinh);
+  if (arguments.asinh) parseAsinh(arguments);
   if (arguments.opacity_unit) parsePositive("--opacity-unit", *arguments.opacity_unit);
   const bool is_auto = arguments.opacity && *arguments.opacity == "auto";
   if (is_auto && isFile(arguments))
-    throw UsageError("--opacity auto cannot be combined with a file: --tf {} has its own opacities",
-                     *arguments.transfer_function);
+    throw UsageError("--opacity auto cannot be combined with a file: {} {} has its own opacities",
+                     optionOf(arguments, "tf"), *arguments.transfer_function);
   if (is_auto && (arguments.range || arguments.asinh))
     throw UsageError("--opacity auto chooses the range as well; remove {}",
-                     arguments.range ? "--range" : "--asinh");
+                     optionOf(arguments, arguments.range ? "range" : "asinh"));
   if (arguments.asinh && isFile(arguments))
-    throw UsageError("--asinh cannot be combined with a file (--tf {})", *arguments.transfer_function);
+    throw UsageError("{} cannot be combined with a file ({} {})", optionOf(arguments, "asinh"),
+                     optionOf(arguments, "tf"), *arguments.transfer_function);
   if (arguments.transfer_function && !isFile(arguments)) try {
       presetDefinition(*arguments.transfer_function);
     } catch (const UsageError& error) {
@@ -156,7 +164,8 @@ void PictureChoice::add(const std::string& option, const std::string& value) {
   chosen_ += shellOption(has_own ? "--opacity" + option.substr(1) : option, value);
 }
 
-std::pair<double, double> PictureChoice::parseRange(const std::string& text) {
+std::pair<double, double> PictureChoice::parseRange(const ScalarArguments& arguments) {
+  const std::string option = optionOf(arguments, "range"), &text = *arguments.range;
   if (text == "data") return {info().min, info().max};
   for (const auto& [word, what] : {std::pair("step", ChosenFor::kStep), {"series", ChosenFor::kSeries}}) {
     const VariableInfo there = variableFor(cache_, variable_, what);
@@ -164,26 +173,26 @@ std::pair<double, double> PictureChoice::parseRange(const std::string& text) {
   }
   const size_t comma = text.find(',');
   const auto end = [&](const std::string& word) {
-    if (!word.ends_with('%')) return parseNumber("--range", word);
-    const double percent = parseNumber("--range", word.substr(0, word.size() - 1));
+    if (!word.ends_with('%')) return parseNumber(option, word);
+    const double percent = parseNumber(option, word.substr(0, word.size() - 1));
     if (!(percent >= 0 && percent <= 100))
-      throw UsageError("--range {}: expected a percentage from 0% to 100%", text);
+      throw UsageError("{} {}: expected a percentage from 0% to 100%", option, text);
     const auto stored =
         what_ == ChosenFor::kSeries ? seriesHistogram(cache_, variable_) : stepHistogram(cache_, variable_);
     return stored && !stored->percentiles.empty() ? stored->percentile(percent / 100)
                                                   : data().percentile(percent / 100);
   };
   if (text.find('%') == std::string::npos) {
-    const auto ends = parseNumbers("--range", text, "LO,HI");
-    if (!(ends[0] < ends[1])) throw UsageError("--range {}: expected LO,HI with LO < HI", text);
+    const auto ends = parseNumbers(option, text, "LO,HI");
+    if (!(ends[0] < ends[1])) throw UsageError("{} {}: expected LO,HI with LO < HI", option, text);
     return {ends[0], ends[1]};
   }
   if (comma == std::string::npos || text.find(',', comma + 1) != std::string::npos)
-    throw UsageError("--range {}: expected two ends, such as 1%,99%", text);
+    throw UsageError("{} {}: expected two ends, such as 1%,99%", option, text);
   const std::pair range(end(text.substr(0, comma)), end(text.substr(comma + 1)));
   if (!(range.first < range.second))
-    throw UsageError("--range {}: {} has {} at both percentiles or the ends are reversed; give numbers", text,
-                     info().name, range.first);
+    throw UsageError("{} {}: {} has {} at both percentiles or the ends are reversed; give numbers", option,
+                     text, info().name, range.first);
   return range;
 }
 
@@ -196,8 +205,8 @@ TransferFunction PictureChoice::function(const ScalarArguments& arguments) {
   FunctionParts parts;
   parts.map = maps_.sequential;
   if (arguments.transfer_function) parts.map = *arguments.transfer_function;
-  parts.range = arguments.range ? parseRange(*arguments.range) : std::pair(info().min, info().max);
-  if (arguments.asinh) parts.asinh = parseAsinh(*arguments.asinh);
+  parts.range = arguments.range ? parseRange(arguments) : std::pair(info().min, info().max);
+  if (arguments.asinh) parts.asinh = parseAsinh(arguments);
   parts.opacities = opacitiesOf(arguments);
   return fromParts(std::move(parts), arguments);
 }
@@ -226,7 +235,7 @@ TransferFunction PictureChoice::withUnit(const TransferFunctionDefinition& defin
 TransferFunction PictureChoice::fromFile(const ScalarArguments& arguments) {
   TransferFunctionDefinition definition = readParaViewPreset(*arguments.transfer_function);
   std::optional<std::pair<double, double>> range;
-  if (arguments.range) range = parseRange(*arguments.range);
+  if (arguments.range) range = parseRange(arguments);
   if (const auto opacities = opacitiesOf(arguments); !opacities.empty()) {
     // Opacities are along the range, which is the file's own if none is given.
     if (!range) range = TransferFunction(definition, nullptr, 1).range();

@@ -24,6 +24,7 @@ struct ScalarArguments {
   std::string scalar;
   std::optional<std::string> transfer_function, range, opacity, asinh, opacity_unit;
   std::optional<TransferFunctionDefinition> film = std::nullopt;  // a film's first, in place of these
+  const char* prefix = "--";  // of --tf, --range and --asinh; "--opacity-" of those of the opacities' scalar
 };
 
 /// Adds --scalar.
@@ -75,7 +76,7 @@ class PictureChoice {
  private:
   const FirstChoice& data();
   VariableInfo info() const { return variableFor(cache_, variable_, what_); }
-  std::pair<double, double> parseRange(const std::string& text);
+  std::pair<double, double> parseRange(const ScalarArguments& arguments);
   TransferFunction fromFile(const ScalarArguments& arguments);
   TransferFunction fromParts(FunctionParts parts, const ScalarArguments& arguments);
   TransferFunction automatic(const ScalarArguments& arguments);

@@ -185,7 +185,9 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
 
 void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities) {
   parseSlices(arguments.slices);
-  parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
+  const SheetOpacity of_slices = parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
+  if (!of_slices.opaque() && arguments.slices.empty() && !arguments.film_has_slices)
+    throw UsageError("--slice-opacity needs a slice: --slice PX,PY,PZ,NX,NY,NZ");
   checkSurfaceOpacities(arguments, has_opacities);
   for (const std::string& colour : arguments.colours) parseColour(colour);
   if (arguments.colours.size() > 1 && arguments.colours.size() != arguments.surfaces.size())
