@@ -100,7 +100,7 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
       least_pager_bytes_,
       backend_->bytes(options.size,
                       {.threads = options.threads, .waiting_splats = FrameBudget::kMinWaitingSplats}) +
-          LayerDrawer::bytes(options) + exchange_bytes + aside_bytes_ +
+          layers_.bytes(options) + exchange_bytes + aside_bytes_ +
           (options.light && options.light->hasShadows() ? ShadowGrid::kBytes : 0),
       options.output_bytes,
       planner_.mostSplats(),
@@ -164,6 +164,7 @@ void FramePipeline::release() {
 
 void FramePipeline::stepChanged() {
   content_ = nextContent();
+  layers_.stepChanged();
   if (pools_) pools_->source.stepChanged();
 }
 

@@ -37,6 +37,7 @@
 #include "render/ranks/splat_exchange.h"
 #include "render/surface/face_meshes.h"
 #include "render/surface/iso_layers.h"
+#include "render/surface/iso_meshes.h"
 #include "render/surface/scene_triangles.h"
 #include "render/sweep/hidden_bricks.h"
 #include "stream/base/compute_permits.h"
@@ -68,12 +69,17 @@ class LayerDrawer {
   void draw(FramePlan& plan, const FrameOptions& options, const Sample& sample,
             const std::function<void()>& throw_if_stopped, FrameStatistics& statistics);
   /// Gives up the memory that is kept from picture to picture.
-  void release() { surface_memory_ = {}; }
+  void release() {
+    surface_memory_ = {};
+    iso_meshes_.release();
+  }
+  /// The cache is at another step.
+  void stepChanged() { iso_meshes_.release(); }
 
   /// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles,
   /// samples of slices and of surfaces, and a layer and a half a pixel with a window behind it. The same for
   /// all pictures of one size.
-  static uint64_t bytes(const FrameOptions& options);
+  uint64_t bytes(const FrameOptions& options) const;
 
  private:
   struct IsoInput {
@@ -81,6 +87,9 @@ class LayerDrawer {
     double depth_origin;
     const ColourTable* opacities;  // of the picture's function; null: not needed
   };
+  const IsoMeshes::Meshes* isoMeshes(const FramePlan& plan, const FrameOptions& options,
+                                     const std::function<void()>& throw_if_stopped,
+                                     FrameStatistics& statistics);
   std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
                                        const IsoInput& input, FrameStatistics& statistics) const;
 
@@ -89,6 +98,7 @@ class LayerDrawer {
   const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
   FaceMeshes face_meshes_;
+  IsoMeshes iso_meshes_;
   ScreenVertices surface_memory_;  // of the last picture's surfaces, for the next one's
 };
 

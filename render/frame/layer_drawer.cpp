@@ -43,15 +43,25 @@ SlicePlan shareOf(const SlicePlan& slice, const FrameOptions& options) {
   return share;
 }
 
+/// The bricks of some parts, each once.
+std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
+  std::vector<uint32_t> bricks;
+  for (const BrickPart& part : parts) bricks.push_back(part.brick);
+  std::sort(bricks.begin(), bricks.end());
+  bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
+  return bricks;
+}
+
 }  // namespace
 
-uint64_t LayerDrawer::bytes(const FrameOptions& options) {
+uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
   if (!options.scene || options.scene->empty()) return 0;
   const uint64_t slice_bytes = options.scene->slices_by_function ? 144 : 72;  // of two scalars
   const auto is_translucent = [](const auto& surface) { return !surface.opacity.opaque(); };
   const bool peels =
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
       std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent) ||
+      (!options.scene->isovalues.empty() && !options.scene->iso_opacity.opaque()) ||
       std::any_of(options.scene->curves.begin(), options.scene->curves.end(),
                   [](const Curves& curves) { return curves.opacity < 1; });
   constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8,
@@ -63,8 +73,11 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) {
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
              kTriangleBytes * surface.mesh->triangles.size();
   for (const Curves& curves : options.scene->curves) bytes += kPointBytes * curves.set->positions.size();
+  // In the grid's cells or in the field of splats, one after the other.
   if (!options.scene->isovalues.empty())
-    bytes += isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels();
+    bytes +=
+        std::max(IsoMeshes::bytes(cache_.manifest(), coloured_by_.has_value()),
+                 isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels());
   if (!options.scene->grid_surfaces.empty())
     bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
@@ -73,7 +86,7 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) {
 void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sample& sample,
                        const std::function<void()>& throw_if_stopped, FrameStatistics& statistics) {
   if (!options.scene || (options.scene->empty() && options.scene->volume)) {
-    surface_memory_ = {};
+    release();
     return;
   }
   const ScreenView& view = plan.settings.view;
@@ -101,9 +114,16 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
   const double depth_origin = view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
   std::optional<ColourTable> opacities;
   if (options.scene->usesOpacities()) opacities.emplace(planner_.transferFunction());
-  const auto isosurfaces =
-      this->isosurfaces(plan, options, {sample, depth_origin, opacities ? &*opacities : nullptr}, statistics);
+  const IsoMeshes::Meshes* const meshes = isoMeshes(plan, options, throw_if_stopped, statistics);
+  std::optional<IsoLayers> isosurfaces;
+  if (!meshes)
+    isosurfaces = this->isosurfaces(plan, options, {sample, depth_origin, opacities ? &*opacities : nullptr},
+                                    statistics);
   const StageTimer timer(statistics.surfaces_s, "draw surfaces");
+  IsoSurfaces in_cells;
+  if (meshes)
+    in_cells = isoSurfaces(*meshes, *options.scene, coloured_by_.has_value(), planner_.colours(),
+                           opacities ? &*opacities : nullptr);
   const SceneLook look{planner_.colours(),
                        options.light,
                        plan.settings.clip_planes,
@@ -111,14 +131,45 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
                        opacities ? &*opacities : nullptr,
                        of_opacity,
                        isosurfaces ? &*isosurfaces : nullptr,
+                       in_cells.values,
                        plan.settings.shadows.get(),
                        throw_if_stopped};
   std::shared_ptr<const PixelLayers> layers;
   runOnThreadsOf(options, [&] {
-    const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
+    SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
+    for (Surface& surface : in_cells.surfaces) scene.surfaces.push_back(std::move(surface));
     layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, &surface_memory_));
   });
   planner_.addLayers(plan, std::move(layers), options);
+}
+
+/// The isosurfaces in the cells of the grid; null where they are those of the field of splats.
+const IsoMeshes::Meshes* LayerDrawer::isoMeshes(const FramePlan& plan, const FrameOptions& options,
+                                                const std::function<void()>& throw_if_stopped,
+                                                FrameStatistics& statistics) {
+  if (options.scene->isovalues.empty()) {
+    iso_meshes_.release();
+    return nullptr;
+  }
+  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
+  const bool needs_other = coloured_by_ && (!of_colours || options.scene->iso_opacity.by_function);
+  IsoMeshes::Wanted wanted{options.scene->isovalues, plan.settings.clip_planes};
+  wanted.variable = of_colours ? *coloured_by_ : variable_;
+  if (needs_other) wanted.other = of_colours ? variable_ : *coloured_by_;
+  wanted.other_is_of_opacities = of_colours;
+  const StageTimer timer(statistics.surfaces_s, "find isosurfaces");
+  try {
+    const IsoMeshes::Meshes* const meshes = iso_meshes_.of(cache_, wanted, throw_if_stopped);
+    if (!meshes) return nullptr;
+    const std::vector<uint32_t> bricks = bricksOf(plan.iso_parts);
+    statistics.iso_bricks = bricks.size();
+    for (const uint32_t brick : bricks) statistics.iso_splats += cache_.bricks()[brick].splats;
+    return meshes;
+  } catch (const DamagedBrick&) {
+    iso_meshes_.release();
+    if (!options.keep_going) throw;
+    return nullptr;  // sampling says which bricks are damaged, and what replaces them
+  }
 }
 
 /// A part of the picture after the other, each as large as its splats fit into the memory. A tile of 32x32 pixels is
@@ -134,10 +185,7 @@ std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const F
                              {opacity.factor, opacity.by_function ? input.opacities : nullptr, of_colours},
                              coloured_by_ && !of_colours};
   IsoLayers layers(settings.view.size);
-  std::vector<uint32_t> bricks;
-  for (const BrickPart& part : plan.iso_parts) bricks.push_back(part.brick);
-  std::sort(bricks.begin(), bricks.end());
-  statistics.iso_bricks = static_cast<uint64_t>(std::unique(bricks.begin(), bricks.end()) - bricks.begin());
+  statistics.iso_bricks = bricksOf(plan.iso_parts).size();
   std::vector<TileRange> left{{0, layers.tiles()}};
   while (!left.empty()) {
     const TileRange tiles = left.back();

@@ -242,11 +242,12 @@ void SampledLayers::shadeBlock(size_t first, size_t count) {
       mean.colour += samples_[spot] * point.colour;
       mean.normal += samples_[spot] * point.normal;
       mean.opacity += samples_[spot] * point.opacity;
+      mean.scalar += samples_[spot] * point.scalar;
       shaded += samples_[spot];
     }
     mean.colour /= shaded;
     const float alpha = has_translucent_ ? layer.part * mean.opacity / shaded : layer.part;
-    layers_[first + n] = {layer.depth, glm::vec4(0, 0, 0, alpha)};
+    layers_[first + n] = {layer.depth, glm::vec4(0, 0, 0, alpha), mean.scalar / shaded};
     put(mean.normal, n, lit.normal);
     put(towards, n, lit.towards_viewer);
     put(mean.colour, n, lit.colour);
@@ -358,7 +359,7 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
   SceneTriangles triangles(scene, view, look.depth_origin,
                            memory ? std::exchange(*memory, {}) : ScreenVertices());
   const TriangleBins bins(triangles);
-  const SurfaceShader shader(triangles, {look.colours, look.opacities}, look.light);
+  const SurfaceShader shader(triangles, {look.colours, look.opacities, look.isovalues}, look.light);
   const PixelSlices pixel_slices(scene, view, slices, look);
   const auto columns = static_cast<size_t>(bins.columns());
   std::vector<PixelLayers::Row> rows(columns * static_cast<size_t>(view.size.height));

@@ -179,6 +179,7 @@ void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> poi
     const size_t number = triangles_.placeOf(spots[n].number).surface;
     Point& point = points[n];
     if (triangles_.isCurve(number)) {
+      point.scalar = NAN;
       shadeCapsule(spots[n], point);
       continue;
     }
@@ -187,6 +188,8 @@ void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> poi
     point.opacity = static_cast<float>(surface.opacity.factor);
     const ColourTable& colours = surface.colours ? *surface.colours : tables_.colours;
     const float scalar = mixed.scalar[n];
+    point.scalar = isovalueOf(number);
+    if (!std::isnan(point.scalar) && !std::isnan(scalar)) point.scalar = scalar;
     point.colour = std::isnan(scalar) ? surface.colour : colours.at(double{scalar});
     if (!surface.opacity.by_function) continue;
     const bool has_other = !surface.mesh->opacity_scalars.empty() && tables_.opacities;
@@ -246,6 +249,12 @@ void SurfaceShader::shadeCapsule(const Spot& spot, Point& point) const {
   const float scalar = begin + place.along * (values[end] - begin);
   if (!std::isnan(scalar))
     point.colour = (curves.colours ? *curves.colours : tables_.colours).at(double{scalar});
+}
+
+/// The value of an isosurface; NaN of another surface.
+float SurfaceShader::isovalueOf(size_t surface) const {
+  const size_t first = triangles_.scene().surfaces.size() - tables_.isovalues.size();
+  return surface < first ? NAN : static_cast<float>(tables_.isovalues[surface - first]);
 }
 
 void SurfaceShader::shade(std::span<const Spot> spots, std::span<Point> points) const {

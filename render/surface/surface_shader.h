@@ -64,6 +64,7 @@ class SurfaceShader {
   struct Tables {
     const ColourTable& colours;
     const ColourTable* opacities = nullptr;
+    std::span<const double> isovalues = {};  // of the scene's last surfaces, which are isosurfaces
   };
   /// `light`: none: a light at the viewer. The triangles and the tables outlive it.
   SurfaceShader(const SceneTriangles& triangles, const Tables& tables, const std::optional<Light>& light);
@@ -78,6 +79,7 @@ class SurfaceShader {
   struct Point {
     glm::vec3 colour{0.0f}, normal{0.0f};
     float opacity = 0;
+    float scalar = 0;  // of an isosurface; else NaN
   };
   /// `points` [spots]: overwritten.
   void shade(std::span<const Spot> spots, std::span<Point> points) const;
@@ -98,6 +100,7 @@ class SurfaceShader {
   template <bool kPerspective>
   static void mix(const Corners& c, size_t count, Mixed& out);
   void gather(std::span<const Spot> spots, Corners& out) const;
+  float isovalueOf(size_t surface) const;
   void shadeBlock(std::span<const Spot> spots, std::span<Point> points) const;
   void shadeCapsule(const Spot& spot, Point& point) const;
   void smoothJoints(size_t curve, uint32_t end, CapsulePlace& place) const;

@@ -1,0 +1,100 @@
+#include "render/surface/iso_meshes.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "render/surface/cell_contour.h"
+
+namespace curvisplat {
+namespace {
+
+/// The bytes of a triangle and its half of a vertex: of the mesh, its vertices on the screen and its runs in tiles; and of what it grows
+/// from.
+constexpr uint64_t kTriangleBytes = 64;
+
+bool isSame(const ClipPlane& a, const ClipPlane& b) {
+  return a.point == b.point && a.normal == b.normal;
+}
+
+}  // namespace
+
+bool IsoMeshes::Wanted::operator==(const Wanted& wanted) const {
+  return values == wanted.values && variable == wanted.variable && other == wanted.other &&
+         other_is_of_opacities == wanted.other_is_of_opacities &&
+         std::equal(planes.begin(), planes.end(), wanted.planes.begin(), wanted.planes.end(), isSame);
+}
+
+uint64_t IsoMeshes::bytes(const Manifest& manifest, bool two_scalars) {
+  if (!canBeOf(manifest)) return 0;
+  // Each cell has at most some triangles of each value.
+  return GridNodes::bytes(manifest, two_scalars) +
+         kTriangleBytes * std::min(kMaxTriangles, 4 * manifest.nodes);
+}
+
+const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& wanted,
+                                       const std::function<void()>& throw_if_stopped) {
+  if (!canBeOf(cache.manifest())) return nullptr;
+  if (of_ != wanted) {
+    const bool has_nodes = of_ && of_->variable == wanted.variable && of_->other == wanted.other;
+    meshes_.reset();
+    of_.reset();
+    if (!has_nodes || !nodes_) {
+      nodes_.reset();
+      nodes_.emplace(cache, wanted.variable, wanted.other, throw_if_stopped);
+    }
+    if (nodes_->areComplete())
+      contour(wanted);
+    else
+      nodes_.reset();
+    of_ = wanted;
+  }
+  return meshes_ ? &*meshes_ : nullptr;
+}
+
+/// Makes the meshes, and keeps none of them where they have too many triangles together.
+void IsoMeshes::contour(const Wanted& wanted) {
+  const uint64_t most = std::min(kMaxTriangles, 4 * uint64_t{nodes_->size()});
+  Meshes meshes;
+  uint64_t left = most;
+  for (const double value : wanted.values) {
+    std::optional<TriangleMesh> mesh = contourCells(*nodes_, value, wanted.planes, left);
+    if (!mesh) {
+      nodes_.reset();
+      return;
+    }
+    left -= std::min<uint64_t>(left, mesh->triangles.size());
+    if (wanted.other_is_of_opacities) mesh->opacity_scalars.swap(mesh->scalars);
+    meshes.push_back(std::make_shared<const TriangleMesh>(std::move(*mesh)));
+  }
+  meshes_ = std::move(meshes);
+}
+
+void IsoMeshes::release() {
+  nodes_.reset();
+  meshes_.reset();
+  of_.reset();
+}
+
+IsoSurfaces isoSurfaces(const IsoMeshes::Meshes& meshes, const SurfaceScene& scene, bool two_scalars,
+                        const ColourTable& colours, const ColourTable* opacities) {
+  IsoSurfaces out;
+  const SheetOpacity& opacity = scene.iso_opacity;
+  const bool of_colours = two_scalars && scene.iso_of_colours;
+  for (size_t n = 0; n < meshes.size(); ++n) {
+    if (meshes[n]->triangles.empty()) continue;
+    const double value = scene.isovalues[n];
+    Surface surface;
+    surface.mesh = meshes[n];
+    surface.by_scalar = two_scalars && !of_colours;
+    if (!surface.by_scalar) surface.colour = colours.at(value);
+    surface.opacity = {opacity.factor, opacity.by_function && of_colours};
+    if (opacity.by_function && !of_colours && opacities)
+      surface.opacity.factor *= double{opacities->opacityAt(value)};
+    if (!(surface.opacity.factor > 0)) continue;
+    out.surfaces.push_back(std::move(surface));
+    out.values.push_back(value);
+  }
+  return out;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,251 @@
+#include "render/surface/joined_nodes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <map>
+#include <tuple>
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kVoters = 128;         // of a face
+constexpr int kMaxRounds = 32;          // maps of a face
+constexpr uint64_t kMaxCompared = 2e8;  // nodes
+constexpr double kNear = 1.5;           // cells, between where a node is expected and a candidate
+constexpr double kMaxAside = 1;         // lengths of the last cell, between there and where the majority says
+constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
+
+/// A face of a block.
+struct BlockFace {
+  size_t block, axis;
+  bool at_end;
+
+  size_t u() const { return axis == 0 ? 1 : 0; }
+  size_t v() const { return axis == 2 ? 1 : 2; }
+  bool operator<(const BlockFace& other) const {
+    return std::tie(block, axis, at_end) < std::tie(other.block, other.axis, other.at_end);
+  }
+};
+
+using Index = std::array<int64_t, 3>;
+using Place = std::array<int64_t, 2>;  // on a face, along u and v
+
+/// One coordinate on a face by those on another: sign * place[of] + offset, or the offset alone.
+struct MappedAxis {
+  int of = 0, sign = 0;  // sign 0: collapsed
+  int64_t offset = 0;
+
+  int64_t at(const Place& place) const { return sign * place[static_cast<size_t>(of)] + offset; }
+  bool operator<(const MappedAxis& other) const {
+    return std::tie(of, sign, offset) < std::tie(other.of, other.sign, other.offset);
+  }
+};
+/// How the lattice of a face lies on another.
+struct FaceMap {
+  BlockFace to;
+  std::array<MappedAxis, 2> along;
+
+  bool operator<(const FaceMap& other) const { return std::tie(to, along) < std::tie(other.to, other.along); }
+};
+
+/// A place where a node is expected, and the cell there: across the face, along u and v.
+struct Expected {
+  glm::dvec3 at;
+  glm::dmat3 cell;
+};
+
+class Joiner {
+ public:
+  Joiner(std::span<const NodeLattice3> blocks, std::span<const uint8_t> is_there,
+         const std::function<glm::dvec3(size_t node)>& at)
+      : blocks_(blocks), is_there_(is_there), at_(at), same_(is_there.size(), kNobody) {
+    for (size_t block = 0; block < blocks.size(); ++block)
+      for (size_t axis = 0; axis < 3; ++axis)
+        for (const bool at_end : {false, true}) faces_.push_back({block, axis, at_end});
+    for (const BlockFace& face : faces_)
+      forFace(face, [&](const Place&, size_t node) {
+        if (is_there_[node]) candidates_.push_back({at_(node).x, static_cast<uint32_t>(node)});
+      });
+    std::sort(candidates_.begin(), candidates_.end());
+    candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
+  }
+
+  std::optional<std::vector<JoinedNode>> find() {
+    size_t left = static_cast<size_t>(std::count(is_there_.begin(), is_there_.end(), 0));
+    // What a face finds may tell the next one where its nodes are expected.
+    for (bool any = true; any && left > 0;) {
+      any = false;
+      for (const BlockFace& face : faces_)
+        for (int round = 0; round < kMaxRounds; ++round) {
+          const size_t found = joinFace(face);
+          left -= found;
+          any = any || found > 0;
+          if (found == 0) break;
+        }
+      if (compared_ > kMaxCompared) break;
+    }
+    if (left > 0) return std::nullopt;
+    std::vector<JoinedNode> joined;
+    for (size_t node = 0; node < same_.size(); ++node)
+      if (same_[node] != kNobody) joined.push_back({static_cast<uint32_t>(node), same_[node]});
+    return joined;
+  }
+
+ private:
+  using Candidate = std::pair<double, uint32_t>;  // x, node
+
+  template <typename Use>
+  void forFace(const BlockFace& face, const Use& use) const {
+    const NodeLattice3& block = blocks_[face.block];
+    for (uint64_t v = 0; v < block.size[face.v()]; ++v)
+      for (uint64_t u = 0; u < block.size[face.u()]; ++u) {
+        const Place place{static_cast<int64_t>(u), static_cast<int64_t>(v)};
+        use(place, *nodeAt(face, place));
+      }
+  }
+  std::optional<size_t> nodeAt(const BlockFace& face, const Place& place) const {
+    const NodeLattice3& block = blocks_[face.block];
+    Index index{};
+    index[face.axis] = face.at_end ? static_cast<int64_t>(block.size[face.axis]) - 1 : 0;
+    index[face.u()] = place[0];
+    index[face.v()] = place[1];
+    size_t node = block.first;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (index[axis] < 0 || index[axis] >= static_cast<int64_t>(block.size[axis])) return std::nullopt;
+      node += static_cast<size_t>(index[axis]) * block.stride(axis);
+    }
+    return node;
+  }
+  bool isKnown(size_t node) const { return is_there_[node] || same_[node] != kNobody; }
+  glm::dvec3 at(size_t node) const { return at_(is_there_[node] ? node : same_[node]); }
+
+  /// Finds where the node at a place of a face is expected, by the two behind it and those beside them.
+  std::optional<Expected> expected(const BlockFace& face, const Place& place) const {
+    const NodeLattice3& block = blocks_[face.block];
+    if (block.size[face.axis] < 3) return std::nullopt;
+    const size_t node = *nodeAt(face, place), step = block.stride(face.axis);
+    const auto behind = [&](size_t n) { return face.at_end ? node - n * step : node + n * step; };
+    if (!isKnown(behind(1)) || !isKnown(behind(2))) return std::nullopt;
+    const glm::dvec3 first = at(behind(1)), across = first - at(behind(2));
+    Expected out{first + across, glm::dmat3(across, glm::dvec3(0.0), glm::dvec3(0.0))};
+    for (size_t n = 0; n < 2; ++n) {
+      const size_t axis = n == 0 ? face.u() : face.v(), beside = block.stride(axis);
+      const bool before = place[n] > 0 && isKnown(behind(1) - beside);
+      const bool after = place[n] + 1 < static_cast<int64_t>(block.size[axis]) && isKnown(behind(1) + beside);
+      if (!before && !after) return std::nullopt;
+      const glm::dvec3 from = before ? at(behind(1) - beside) : first;
+      out.cell[static_cast<int>(n) + 1] =
+          (after ? at(behind(1) + beside) - from : first - from) * (before && after ? 0.5 : 1.0);
+    }
+    return out;
+  }
+
+  /// A grid line's last cell may be longer or shorter; beside it, half a cell is another node.
+  static double lengthOf(const glm::dvec3& in_cells) {
+    return std::max({std::abs(in_cells.x), 2 * std::abs(in_cells.y), 2 * std::abs(in_cells.z)});
+  }
+  double inCells(size_t node, const Expected& expected) const {
+    return lengthOf(glm::inverse(expected.cell) * (at_(node) - expected.at));
+  }
+  /// The candidate nearest to there, in cells.
+  std::optional<size_t> nearest(const Expected& expected) {
+    const double reach = kNear * (glm::length(expected.cell[0]) + glm::length(expected.cell[1]) +
+                                  glm::length(expected.cell[2]));
+    const glm::dmat3 in_cells = glm::inverse(expected.cell);
+    std::optional<size_t> best;
+    double least = kNear;
+    auto candidate =
+        std::lower_bound(candidates_.begin(), candidates_.end(), Candidate{expected.at.x - reach, 0});
+    for (; candidate != candidates_.end() && candidate->first <= expected.at.x + reach; ++candidate) {
+      ++compared_;
+      const double distance = lengthOf(in_cells * (at_(candidate->second) - expected.at));
+      if (distance < least) least = distance, best = candidate->second;
+    }
+    return best;
+  }
+
+  /// Finds nodes of a face by one map; how many.
+  size_t joinFace(const BlockFace& face) {
+    std::vector<Place> missing;
+    forFace(face, [&](const Place& place, size_t node) {
+      if (!isKnown(node) && expected(face, place)) missing.push_back(place);
+    });
+    if (missing.empty() || compared_ > kMaxCompared) return 0;
+    std::map<FaceMap, size_t> votes;
+    const size_t step = std::max<size_t>(1, missing.size() / kVoters);
+    for (size_t n = 0; n < missing.size(); n += step)
+      if (const auto node = nearest(*expected(face, missing[n]))) vote(missing[n], *node, votes);
+    // The first of two with the same votes counts: those that are not collapsed come first.
+    std::vector<std::pair<FaceMap, size_t>> sorted(votes.begin(), votes.end());
+    std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
+      return std::tuple(b.second, collapsed(a.first)) < std::tuple(a.second, collapsed(b.first));
+    });
+    for (size_t n = 0; n < std::min<size_t>(sorted.size(), 4); ++n)
+      if (const size_t found = follow(face, missing, sorted[n].first)) return found;
+    return 0;
+  }
+  static int collapsed(const FaceMap& map) { return (map.along[0].sign == 0) + (map.along[1].sign == 0); }
+
+  /// Votes for all maps that take a place to a node.
+  void vote(const Place& place, size_t node, std::map<FaceMap, size_t>& votes) const {
+    constexpr std::array<std::pair<int, int>, 5> kWays{{{0, 1}, {0, -1}, {1, 1}, {1, -1}, {0, 0}}};
+    for (const BlockFace& to : faces_) {
+      const auto there = placeOn(to, node);
+      if (!there) continue;
+      for (const auto& [of_u, sign_u] : kWays)
+        for (const auto& [of_v, sign_v] : kWays) {
+          if (sign_u != 0 && sign_v != 0 && of_u == of_v) continue;
+          FaceMap map{to, {MappedAxis{of_u, sign_u, 0}, MappedAxis{of_v, sign_v, 0}}};
+          for (size_t n = 0; n < 2; ++n) map.along[n].offset = (*there)[n] - map.along[n].at(place);
+          ++votes[map];
+        }
+    }
+  }
+  /// The place of a node on a face, if it is on it.
+  std::optional<Place> placeOn(const BlockFace& face, size_t node) const {
+    const NodeLattice3& block = blocks_[face.block];
+    if (node < block.first || node >= block.first + block.nodes()) return std::nullopt;
+    const auto index = [&](size_t axis) {
+      return static_cast<int64_t>((node - block.first) / block.stride(axis) % block.size[axis]);
+    };
+    if (index(face.axis) != (face.at_end ? static_cast<int64_t>(block.size[face.axis]) - 1 : 0))
+      return std::nullopt;
+    return Place{index(face.u()), index(face.v())};
+  }
+
+  /// Takes the nodes that a map leads to; how many.
+  size_t follow(const BlockFace& face, const std::vector<Place>& missing, const FaceMap& map) {
+    std::vector<std::pair<size_t, size_t>> found;
+    for (const Place& place : missing) {
+      const auto to = nodeAt(map.to, {map.along[0].at(place), map.along[1].at(place)});
+      if (!to || !is_there_[*to]) continue;
+      const Expected there = *expected(face, place);
+      if (inCells(*to, there) <= kNear ||
+          glm::length(at_(*to) - there.at) <= kMaxAside * glm::length(there.cell[0]))
+        found.push_back({*nodeAt(face, place), *to});
+    }
+    for (const auto& [node, same] : found) same_[node] = static_cast<uint32_t>(same);
+    return found.size();
+  }
+
+  const std::span<const NodeLattice3> blocks_;
+  const std::span<const uint8_t> is_there_;
+  const std::function<glm::dvec3(size_t node)>& at_;
+  std::vector<BlockFace> faces_;
+  std::vector<Candidate> candidates_;  // nodes of faces that have splats, by x
+  std::vector<uint32_t> same_;         // [node]: whose splat it has; kNobody: its own, or not known
+  uint64_t compared_ = 0;
+};
+
+}  // namespace
+
+std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,
+                                                       std::span<const uint8_t> is_there,
+                                                       const std::function<glm::dvec3(size_t node)>& at) {
+  return Joiner(blocks, is_there, at).find();
+}
+
+}  // namespace curvisplat

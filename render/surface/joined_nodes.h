@@ -1,0 +1,41 @@
+// Finds the nodes that share a splat: faces of blocks that meet, or one that is folded, closed or collapsed onto a line. The splat is
+// stored as one of the nodes; the others have none, and are found by where the grid lines that lead to their face would go on to.
+//
+// Node by node the nearest one may be the wrong one, where cells are much thinner than they are long. So the nodes of a face vote for how
+// its lattice lies on that of another face (or the same): turned, mirrored, shifted or collapsed; all follow the majority.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace curvisplat {
+
+/// The lattice of a block's nodes.
+struct NodeLattice3 {
+  std::array<uint64_t, 3> size;  // along i, j, k
+  size_t first;                  // number of its first node; i fastest
+
+  size_t stride(size_t axis) const {
+    return static_cast<size_t>(axis == 0 ? 1 : axis == 1 ? size[0] : size[0] * size[1]);
+  }
+  size_t nodes() const { return static_cast<size_t>(size[0] * size[1] * size[2]); }
+};
+
+/// A node without a splat, and the one that has it.
+struct JoinedNode {
+  uint32_t node, same;
+};
+
+/// The partners of all nodes for which is_there[node] is 0, in the order of the nodes; none if one is not found. `at`: where a node is.
+/// Takes as long as some 10⁸ comparisons at most. Pure.
+std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,
+                                                       std::span<const uint8_t> is_there,
+                                                       const std::function<glm::dvec3(size_t node)>& at);
+
+}  // namespace curvisplat
