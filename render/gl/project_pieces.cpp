@@ -34,14 +34,14 @@ uint elementsAPiece(uint p) {
   return 2u + (parts[p + 4u].z >> 8) + colour_records;
 }
 
-const uint INSIDE = 0u, ACROSS = 1u, OUTSIDE = 2u;
+const uint kInside = 0u, kAcross = 1u, kOutside = 2u;
 
 // This is LocalClipPlanes::sidesOf().
 uint sideOfPlanes(uint p, vec3 position, mat3 a, float support) {
-  uint side = INSIDE, first = parts[p + 4u].y;
+  uint side = kInside, first = parts[p + 4u].y;
   for (uint n = first; n < first + planesOf(p); ++n) {
     float distance = dot(planes[n].xyz, position) + planes[n].w, reach = support * length(rowOf(planes[n].xyz, a));
-    side = max(side, distance >= reach ? INSIDE : distance > -reach ? ACROSS : OUTSIDE);
+    side = max(side, distance >= reach ? kInside : distance > -reach ? kAcross : kOutside);
   }
   return side;
 }
@@ -66,13 +66,13 @@ vec2 boundsOver(vec2 from, vec2 to) {
   return bounds;
 }
 
-// This is LocalLayers::sideOf(): INSIDE before all layers, OUTSIDE behind opaque ones.
+// This is LocalLayers::sideOf(): kInside before all layers, kOutside behind opaque ones.
 uint sideOfLayers(uint p, Place at, Ellipse e, mat3 a) {
-  if (!isLayered(p)) return INSIDE;
+  if (!isLayered(p)) return kInside;
   float reach = DEPTH_REACH * length(rowOf(at.depth_row, a));
   vec2 reach_px = SUPPORT * vec2(e.l11, abs(e.l21) + e.l22), bounds = boundsOver(at.pixel - reach_px, at.pixel + reach_px);
-  if (at.layer_depth + reach <= bounds.x) return INSIDE;
-  return at.layer_depth - reach >= bounds.y ? OUTSIDE : ACROSS;
+  if (at.layer_depth + reach <= bounds.x) return kInside;
+  return at.layer_depth - reach >= bounds.y ? kOutside : kAcross;
 }
 
 // B's rows, and a field that is linear in space as the pixels see it; plane_cuts.cpp explains them.
@@ -272,10 +272,10 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
   Ray ray = rayOf(rowOf(at.row0, a), rowOf(at.row1, a));
   Ellipse e = ellipseOf(ray.b0, ray.b1, piece.w, s.variance, piece.weight * at.volume);
   uint side = sideOfLayers(p, at, e, a);
-  if (side == OUTSIDE) return 0u;
+  if (side == kOutside) return 0u;
   Cut cut = cutOf(p, ray, e, a, piece, s.clipped);
   if (cut.nothing) return 0u;
-  bool faces = cut.count > 0, across = side == ACROSS;
+  bool faces = cut.count > 0, across = side == kAcross;
   float mean = piece.mean, correlation = faces ? correlationOf(ray, piece.w, e.half_width, steepest(cut)) : 0.0;
   Field depth = fieldOf(ray, across ? rowOf(at.depth_row, a) : vec3(0.0));
   float depth_steepness = across ? steepnessOfDepth(ray, depth) : 0.0;
@@ -324,24 +324,24 @@ uint project(uvec4 group, uint thread) {
   if (words[at + 10u * n] != NO_BORDER) return 3u;  // it is drawn in pieces
   Splat s = splatAt(n, at);
   uint planes_side = sideOfPlanes(p, s.piece.position, s.a, SUPPORT);
-  if (planes_side == OUTSIDE) return 4u;
-  s.clipped = planes_side == ACROSS;
+  if (planes_side == kOutside) return 4u;
+  s.clipped = planes_side == kAcross;
   Place place = placeOf(p, s.piece.position);
   vec3 b0 = rowOf(place.row0, s.a), b1 = rowOf(place.row1, s.a);
   Ellipse e = ellipseOf(b0, b1, s.piece.w, s.variance, s.piece.weight * place.volume);
-  uint side = s.clipped ? INSIDE : sideOfLayers(p, place, e, s.a);
-  if (side == OUTSIDE) return 5u;
+  uint side = s.clipped ? kInside : sideOfLayers(p, place, e, s.a);
+  if (side == kOutside) return 5u;
   vec3 gradient = gradientOf(s.piece.w, s.piece.axis, s.piece.shear);
   s.opacity = opacityOf(gradient);
   if (!(s.opacity > 0.0)) return 1u;
-  if ((s.clipped || side == ACROSS) && isTransparentThroughout(s, length(s.piece.w))) return 1u;
+  if ((s.clipped || side == kAcross) && isTransparentThroughout(s, length(s.piece.w))) return 1u;
   s.slope = planeOf(b0, b1, rowOf(place.to_depth, s.a));
   s.lit_by = litAt(p, s.piece.position, gradient);
   uint skew = skewOf(words[at + 11u * n], vec2(b0.x, b1.x), vec2(b0.y, b1.y), vec2(b0.z, b1.z), e);
   return drawPiece(slot, room, p, s, s.piece, skew);
 }
 
-// A splat that is drawn in pieces. Returns which of `fates` counts it.
+// This draws a splat in pieces. Returns which of `fates` counts it.
 uint projectPieces(uvec4 group, uint thread) {
   uint p = PART_VECTORS * group.x, n = parts[p].y, room = elementsAPiece(p);
   uint table = parts[p].x + stored_arrays * n, own = table + 4u * (group.y + thread);
@@ -350,8 +350,8 @@ uint projectPieces(uvec4 group, uint thread) {
   for (uint k = 0u; k < room * count; ++k) writeNothing(slot + 4u * k);
   Splat s = splatAt(n, parts[p].x + words[own]);
   uint planes_side = sideOfPlanes(p, s.piece.position, s.a, SUPPORT_AT_BORDER);
-  if (planes_side == OUTSIDE) return 4u;
-  s.clipped = planes_side == ACROSS;
+  if (planes_side == kOutside) return 4u;
+  s.clipped = planes_side == kAcross;
   vec3 gradient = gradientOf(s.piece.w, s.piece.axis, s.piece.shear);
   s.opacity = opacityOf(gradient);
   if (!(s.opacity > 0.0) || isTransparentThroughout(s, uintBitsToFloat(words[own + 3u]))) return 1u;

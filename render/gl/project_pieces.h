@@ -7,9 +7,9 @@
 
 namespace curvisplat {
 
-/// Its buffers and uniforms.
+/// The buffers and uniforms that it reads.
 std::string pieceInputs();
-/// Its functions, main() among them; they follow those of project_shader.cpp.
+/// The functions, main() among them. They follow those of project_shader.cpp.
 std::string pieceFunctions();
 
 }  // namespace curvisplat

@@ -121,7 +121,7 @@ uint skewOf(uint code, vec2 a0, vec2 a1, vec2 a2, Ellipse e) {
   return packSkew(t);
 }
 
-// As in gradient_opacity.h.
+// This is gradientOf() in gradient_opacity.h.
 vec3 gradientOf(vec3 w, vec3 axis, vec3 shear) {
   vec3 g;
   g.z = w.z / axis.z;

@@ -135,7 +135,7 @@ TEST_F(CardBricksTest, DrawSplatsAtBordersInTheSamePieces) {
   }
 }
 
-/// What splats are drawn with besides themselves, each alone and all together.
+/// An addition to what splats are drawn with.
 struct Addition {
   const char* name;
   std::function<void(FrameOptions&)> set;
