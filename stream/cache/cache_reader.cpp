@@ -1,6 +1,7 @@
 #include "stream/cache/cache_reader.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -49,6 +50,14 @@ Manifest manifestAtStep(const GeometryFolder& folder, const Manifest& of_series,
   return manifest;
 }
 
+/// What tells a folder from another that takes its name: device and inode. Zeros where there is no such folder, as of a cache on a
+/// web server.
+std::pair<uint64_t, uint64_t> identityOf(const fs::path& folder) {
+  struct stat found {};
+  if (::stat(folder.c_str(), &found) != 0) return {};
+  return {found.st_dev, found.st_ino};
+}
+
 }  // namespace
 
 /// A brick's values to be decoded, and what that costs and may use.
@@ -65,15 +74,33 @@ struct CacheReader::State {
   State(const fs::path& cache_path, uint64_t number)
       : cache(cache_path),
         whole(cache_path),
+        identity(identityOf(cache_path)),
         of_series(std::make_shared<const Manifest>(readManifest(cache_path))) {
     series = std::make_shared<const Series>(readSeries(cache, *of_series));
     open(number, nullptr);
   }
 
   State(const State& other, const StepPosition& wanted)
-      : cache(other.cache), whole(other.whole), of_series(other.of_series), series(other.series) {
-    open(wanted.step, &other);
-    if (wanted.part > 0) blendWithNext(wanted.part);
+      : cache(other.cache),
+        whole(other.whole),
+        identity(other.identity),
+        of_series(other.of_series),
+        series(other.series) {
+    opening([&] {
+      open(wanted.step, &other);
+      if (wanted.part > 0) blendWithNext(wanted.part);
+    });
+  }
+
+  /// Runs `open_files`. If it fails since the cache is no longer there, the error says so.
+  template <typename OpenFiles>
+  void opening(const OpenFiles& open_files) const {
+    try {
+      open_files();
+    } catch (const Error&) {
+      if (identityOf(cache) == identity) throw;
+      throw Error("{}: has been replaced or removed since it was opened; open it again", cache.string());
+    }
   }
 
   void open(uint64_t number, const State* other) {
@@ -169,9 +196,9 @@ struct CacheReader::State {
 
   /// The values of a variable at an earlier step, kept open from then on. Any thread.
   std::shared_ptr<const ValuesFile> earlierValues(uint64_t at_step, size_t variable) const {
-    const MutexLock lock(opening);
+    const MutexLock lock(opening_earlier);
     auto& known = earlier[{at_step, variable}];
-    if (!known) known = folder->values(*series, at_step, variable);
+    if (!known) opening([&] { known = folder->values(*series, at_step, variable); });
     return known;
   }
 
@@ -183,6 +210,7 @@ struct CacheReader::State {
   class ValuesDecoder;
 
   fs::path cache, whole;
+  std::pair<uint64_t, uint64_t> identity;  // of the folder `cache` when it was opened
   std::shared_ptr<const Manifest> of_series;
   std::shared_ptr<const Series> series;
   StepPosition position;
@@ -191,9 +219,9 @@ struct CacheReader::State {
   std::vector<std::shared_ptr<const ValuesFile>> values;  // [variable]
   std::unique_ptr<const State> next;                      // of a position between two steps: the later one
   std::vector<std::vector<BrickVariable>> blended;        // the tables there
-  mutable Mutex opening;
+  mutable Mutex opening_earlier;
   mutable std::map<std::pair<uint64_t, size_t>, std::shared_ptr<const ValuesFile>> earlier
-      GUARDED_BY(opening);
+      GUARDED_BY(opening_earlier);
 };
 
 /// Decodes a brick's values, with those of earlier steps that they are predicted from, each once.

@@ -336,6 +336,22 @@ TEST(Series, OfAnEarlierProgramIsStillRead) {
   }
 }
 
+TEST(Series, SaysThatItsCacheHasBeenReplacedOrRemoved) {
+  const TemporaryFolder folder;
+  const fs::path kept = fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/series.splats",
+                 cache = folder / "a.splats";
+  fs::copy(kept, cache, fs::copy_options::recursive);
+  const CacheReader reader(cache);
+  const auto refusal = [&] { return errorOf([&] { reader.at({1}); }); };
+  EXPECT_EQ(refusal(), "");
+  const std::string replaced =
+      cache.string() + ": has been replaced or removed since it was opened; open it again";
+  fs::rename(cache, folder / "earlier");
+  EXPECT_EQ(refusal(), replaced);
+  fs::create_directory(cache);
+  EXPECT_EQ(refusal(), replaced);
+}
+
 TEST(Series, NearestStepInTime) {
   Series series;
   for (const double time : {0.0, 1.0, 4.0}) series.add({time, 0, 0, 0, {}});
