@@ -256,7 +256,7 @@ bool isTransparentThroughout(Splat s, float drawn) {
   return isTransparent(s.piece.mean - most, s.piece.mean + most);
 }
 
-// As withScalarOf(): A's lower triangle is solved, once for each column of the piece's.
+// Solves by the lower triangle of A, once for each column of the piece, as withScalarOf() does.
 vec3 inFrameOf(Piece whole, vec3 v) {
   vec3 u;
   u.x = v.x / whole.axis.x;

@@ -50,8 +50,8 @@ Manifest manifestAtStep(const GeometryFolder& folder, const Manifest& of_series,
   return manifest;
 }
 
-/// What tells a folder from another that takes its name: device and inode. Zeros where there is no such folder, as of a cache on a
-/// web server.
+/// Returns device and inode, which tell a folder from another that takes its name. Zeros where there is no such folder, as of
+/// a cache on a web server.
 std::pair<uint64_t, uint64_t> identityOf(const fs::path& folder) {
   struct stat found {};
   if (::stat(folder.c_str(), &found) != 0) return {};

@@ -386,9 +386,11 @@ TEST_F(FurtherScalarTest, OneIsAddedForItsOpacities) {
   open();
   click("opacity by");
   click("further opacity by volume");
-  ASSERT_TRUE(eventually([] { return hasWidget("automatic") && hasWidget("opacity by") && !hasWidget("opening"); },
-                         300));
-  ASSERT_TRUE(eventually([] { return runProgram({"info", "one.splats"}).out.find("volume") != std::string::npos; }));
+  ASSERT_TRUE(eventually(
+      [] { return hasWidget("automatic") && hasWidget("opacity by") && !hasWidget("opening"); }, 300));
+  ASSERT_TRUE(eventually([] {
+    return runProgram({"info", "one.splats"}).out.find("volume") != std::string::npos;
+  }));
   save();
   const Image two = saveAndCopy();
   const auto commands = close();

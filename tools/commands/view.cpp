@@ -111,8 +111,9 @@ ConversionServices conversionServices(ValuePrecision precision) {
     try {
       return keptCacheOf(files, progress, kept, {}, precision);
     } catch (const LoneGrid&) {
-      throw Error("{}: has no values, only coordinates: choose the solution, too (Ctrl + click takes several files)",
-                  files.front().filename().string());
+      throw Error(
+          "{}: has no values, only coordinates: choose the solution, too (Ctrl + click takes several files)",
+          files.front().filename().string());
     }
   };
   services.sources_of = sourcesOf;

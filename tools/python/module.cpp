@@ -204,7 +204,7 @@ ConvertOptions convertOptions(const std::filesystem::path& output, const py::dic
   return options;
 }
 
-/// What a conversion did to the cells without having been asked to, for the report.
+/// Says what a conversion did to the cells without having been asked to.
 std::vector<std::string> notesOn(const GridDescription& description, bool cuts_by_need) {
   const std::string note = cuts_by_need ? noteOnCuts(description, "refine=1") : "";
   return note.empty() ? std::vector<std::string>{} : std::vector{note};

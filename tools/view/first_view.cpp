@@ -56,8 +56,8 @@ double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& 
   const double half = 0.5 * sums.back();
   const auto next = std::ranges::lower_bound(sums, half);  // not the first, which is 0
   const double before = *(next - 1);
-  return function.scalarAt((static_cast<double>(next - sums.begin()) - 1 + (half - before) / (*next - before)) /
-                           count);
+  return function.scalarAt(
+      (static_cast<double>(next - sums.begin()) - 1 + (half - before) / (*next - before)) / count);
 }
 
 EditedFunction chosenAnew(const EditedFunction& before, EditedFunction automatic) {

@@ -27,7 +27,7 @@ struct WindowSettings {
   bool light_theme = false;
   double text_scale = 1;
   std::vector<std::vector<std::string>>
-      recent;  // what was opened, the newest first: a cache, or a grid's files
+      recent;                    // what was opened, the newest first: a cache, or a grid's files
   std::string data_folder = {};  // from which the dialog opened data last; empty: it did not
 
   /// Puts these files at the front; of more than 12 entries the oldest are forgotten.

@@ -118,7 +118,8 @@ class TrajectoryReader {
     }
     along_dim_ = dims[0];
     const std::string& name = files_.dimensions()[dims[0]].name;
-    if ((counts_ = withAttribute("sample_dimension", name)) && counts_->dims.size() == 1 && counts_->dims != dims)
+    if ((counts_ = withAttribute("sample_dimension", name)) && counts_->dims.size() == 1 &&
+        counts_->dims != dims)
       return;
     counts_ = nullptr;
     const NetcdfVariable* const id = withIds();
