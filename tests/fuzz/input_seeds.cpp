@@ -263,6 +263,38 @@ void writeModels(const Seeds& seeds) {
   write("wrf", 2);
 }
 
+/// Writes trajectories as a full array, and as ragged ones by counts and by the number of each observation's line.
+void writeTrajectories(const Seeds& seeds) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.nc";
+  using Index = std::vector<size_t>;
+  constexpr auto kNumbers = NetcdfNumbers::kSinglePrecision;
+  const auto number = [](const Index& at) { return static_cast<double>(at.back()); };
+  for (const char* kind : {"full", "counts", "numbers"}) {
+    {
+      NetcdfWriter file(path, NetcdfFileType::kClassic);
+      file.dimension("line", 2);
+      file.dimension("obs", 4);
+      const bool full = kind == std::string("full");
+      const std::vector<std::string> dims =
+          full ? std::vector<std::string>{"line", "obs"} : std::vector<std::string>{"obs"};
+      if (kind == std::string("counts"))
+        file.variable("count", NetcdfNumbers::kInt16, {"line"}, {{"sample_dimension", "obs"}},
+                      [](const Index& at) { return at[0] == 0 ? 1.0 : 3.0; });
+      if (kind == std::string("numbers"))
+        file.variable("of", NetcdfNumbers::kInt16, {"obs"}, {{"instance_dimension", "line"}},
+                      [](const Index& at) { return static_cast<double>(at[0] % 2); });
+      file.variable("time", kNumbers, dims, {{"units", "days since 2001-01-01"}}, number);
+      file.variable("lon", kNumbers, dims, {{"units", "degrees_east"}}, number);
+      file.variable("lat", kNumbers, dims, {{"units", "degrees_north"}}, number);
+      file.variable("z", kNumbers, full ? dims : std::vector<std::string>{"obs"},
+                    {{"units", "m"}, {"positive", "down"}}, number);
+      file.variable("p", kNumbers, full ? std::vector<std::string>{"line"} : dims, {}, number);
+    }
+    seeds.write("trajectories", kind, Seed().add(uint8_t{1}).text(bytesOfFile(path)).whole());
+  }
+}
+
 /// A grid, and one followed by empty lines, as long as the buffer into which they are decompressed.
 void writeCompressed(const Seeds& seeds) {
   const std::string text = std::string("# vtk DataFile Version 2.0\na\nASCII\nDATASET STRUCTURED_POINTS\n") +
@@ -313,6 +345,7 @@ void writeInputSeeds(const Seeds& seeds) {
   writeVtk(seeds);
   writeNetcdf(seeds);
   writeModels(seeds);
+  writeTrajectories(seeds);
   writeCompressed(seeds);
   writeMeshes(seeds);
 }

@@ -145,6 +145,25 @@ def curve_seeds(folder):
         put("vtk_curves", name, bytes([choice]) + (folder / "a").read_bytes())
     put("curve_text", "trajectories", b"\2x,y,z,p,id\n0,0,0,1,a\n1,0,0,2,a\n\n1,1,+1e2,,b # words\n2,2,2,nan,b\n")
     put("curve_text", "points", b"\1" + b"0 0 0\n1 0.5 -2\r\n")
+    put("curve_text", "geojson", b"\4" + json.dumps({"type": "FeatureCollection", "features": [
+        {"type": "Feature", "geometry": {"type": kind, "coordinates": places}} for kind, places in (
+            ("Point", [5, 57]), ("MultiPoint", [[5, 57, 100], [6, 58]]), ("LineString", [[5, 57], [6, 57.2]]), ("MultiLineString", [[[179, 0], [181, 1]]]),
+            ("Polygon", [[[0, 0], [1, 0], [0, 1], [0, 0]]]), ("MultiPolygon", [[[[0, 0], [1, 0], [0, 1], [0, 0]]]]))] + [
+        {"type": "Feature", "geometry": {"type": "GeometryCollection", "geometries": [{"type": "Point", "coordinates": [7, 8]}]}},
+        {"type": "Feature", "geometry": None}]}).encode())
+    put("curve_text", "shapefile", b"\x08" + shapefile())
+
+
+def shapefile():
+    """Each kind of shape once."""
+    def of_parts(kind, parts, places):
+        return struct.pack("<i4d2i", kind, 0, 0, 1, 1, len(parts), len(places)) + struct.pack(f"<{len(parts)}i", *parts) + np.array(places, "<f8").tobytes()
+
+    places = [[0, 0], [1, 0], [0, 1], [2, 2], [2.5, 3]]
+    shapes = [struct.pack("<i", 0), struct.pack("<i2d", 1, 5, 57), of_parts(3, [0, 3], places), of_parts(5, [0], places[:3] + places[:1]),
+              struct.pack("<i4di", 8, 0, 0, 1, 1, 2) + np.array(places[:2], "<f8").tobytes(), struct.pack("<i4d", 11, 5, 57, 3, 4)]
+    records = b"".join(struct.pack(">2i", n + 1, len(shape) // 2) + shape for n, shape in enumerate(shapes))
+    return struct.pack(">7i", 9994, 0, 0, 0, 0, 0, 50 + len(records) // 2) + struct.pack("<2i8d", 1000, 3, *[0] * 8) + records
 
 
 def text(value):

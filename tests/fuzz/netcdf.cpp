@@ -1,6 +1,12 @@
-// Files in classic NetCDF, whose header libnetcdf parses once it has been checked here (NetCDF-4 is HDF5's), and Zarr.
+// Files in classic NetCDF, whose header libnetcdf parses once it has been checked here (NetCDF-4 is HDF5's), and Zarr: grids and
+// trajectories.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
 #include "preprocess/formats/columns/columns_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
+#include "preprocess/formats/netcdf/cf_trajectories.h"
 #include "preprocess/formats/netcdf/netcdf_file.h"
 #include "preprocess/formats/netcdf/netcdf_structure.h"
 #include "preprocess/formats/netcdf/open_netcdf.h"
@@ -80,6 +86,30 @@ void fuzzZarr(std::span<const std::byte> bytes) {
 }
 
 const RegisteredFuzzTarget zarr_target("zarr", fuzzZarr);
+
+// Trajectories in classic NetCDF files and archives of Zarr stores. The first byte: with the values of p (1).
+void fuzzTrajectories(std::span<const std::byte> bytes) {
+  FuzzInput input(bytes);
+  const std::string scalar = (input.take<uint8_t>() & 1) != 0 ? "p" : "";
+  const std::string_view start = textOf(input.rest()).substr(0, 3);
+  if (start != "CDF" && !start.starts_with("PK")) return;
+  const auto path = fuzzFile(start == "CDF" ? "a.nc" : "a.zip", input.rest());
+  if (!isTrajectoryFile(path)) return;
+  const CfTrajectories read = readCfTrajectories(path, scalar);
+  CURVISPLAT_CHECK_OP(read.begins.back(), ==, read.points.size());
+  CURVISPLAT_CHECK(read.values.empty() || read.values.size() == read.points.size());
+  CURVISPLAT_CHECK(read.times.empty() || read.times.size() == read.points.size());
+  for (const glm::dvec3& point : read.points)
+    CURVISPLAT_CHECK(std::isfinite(point.x) && std::isfinite(point.y) && std::isfinite(point.z));
+  for (size_t line = 0; line + 1 < read.begins.size(); ++line) {
+    CURVISPLAT_CHECK_OP(read.begins[line], <, read.begins[line + 1]);
+    if (!read.times.empty())
+      CURVISPLAT_CHECK(
+          std::is_sorted(&read.times[read.begins[line]], &read.times[read.begins[line + 1] - 1] + 1));
+  }
+}
+
+const RegisteredFuzzTarget trajectories_target("trajectories", fuzzTrajectories);
 
 }  // namespace
 }  // namespace curvisplat
