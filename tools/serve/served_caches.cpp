@@ -104,9 +104,10 @@ std::string ServedCaches::helloText() const {
   json["caches"] = Json::array();
   for (const Served& cache : caches_) json["caches"].push_back(cache.name);
   json["maps"] = Json::array();
-  for (const PublishedMap& map : builtInMaps())
-    json["maps"].push_back(
-        {{"name", map.name}, {"strip", stripOf(EditedFunction(map.name, 0, 1, 1), kSwatchColours)}});
+  for (const PublishedMap& map : builtInMaps()) {
+    const EditedFunction function(std::string(map.name), 0, 1, 1);
+    json["maps"].push_back({{"name", map.name}, {"strip", stripOf(function, kSwatchColours)}});
+  }
   json["most_pixels"] = kMaxPixels;
   json["largest_side"] = kLargestSide;
   return textOf(json);
