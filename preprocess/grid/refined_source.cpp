@@ -37,10 +37,10 @@ GridBlock refinedBlock(const GridBlock& block, const CellCuts& parts) {
 
 /// The planes of the grid around the refined ones from begin to end: with those before and behind a plane of the grid
 /// itself, since the cells on both of its sides decide whether a node is blanked; for the values of cells with those of two
-/// cells on each side.
+/// cells before, and of two cells and the node behind them after.
 std::pair<uint64_t, uint64_t> planesAround(uint64_t begin, uint64_t end, uint64_t count, uint32_t parts,
                                            bool for_cells) {
-  if (for_cells) return {std::max<uint64_t>(begin / parts, 2) - 2, std::min((end - 1) / parts + 3, count)};
+  if (for_cells) return {std::max<uint64_t>(begin / parts, 2) - 2, std::min((end - 1) / parts + 4, count)};
   return {(std::max<uint64_t>(begin, 1) - 1) / parts, std::min((end - 1) / parts + 2, count)};
 }
 
@@ -50,8 +50,8 @@ struct CellStep {
   double difference = 0, change = 0;
 };
 
-/// How much a cell's value changes from its one side to the other, by the steps to the cells before and after it: no part of
-/// the cell is then beyond these two (the monotonized central limiter of van Leer 1977).
+/// How much a cell's value changes from its one side to the other, by the steps to the cells before and after it: along their
+/// axis no part of the cell is then beyond these two (the monotonized central limiter of van Leer 1977).
 double changeBetween(const CellStep& before, const CellStep& after) {
   if (!(before.difference * after.difference < 0)) return 0;
   const double most = 2 * std::min(std::abs(before.difference), std::abs(after.difference));
@@ -59,7 +59,7 @@ double changeBetween(const CellStep& before, const CellStep& after) {
 }
 
 /// The same at a border, by the step away from it and the further difference, to the second cell: none unless both have one
-/// sign; and no part of the cell has another sign than `value`.
+/// sign; and along the axis no part of the cell has another sign than `value`.
 double changeAtBorder(double value, const CellStep& step, double further) {
   if (!(step.difference * further > 0)) return 0;
   return std::copysign(std::min({std::abs(step.change), 2 * std::abs(further), 2 * std::abs(value)}),
@@ -162,7 +162,7 @@ class NodesAround {
   }
 
   /// The value of the part of a cell whose lowest node is the refined `node`. A cell's value is that of its middle, and the mean
-  /// of its parts. `isThere(cell)`: whether a cell has a value, by its lowest node.
+  /// of its parts; among cells of one sign no part has another. `isThere(cell)`: whether a cell has a value, by its lowest node.
   template <typename IsThere>
   float valueOfPart(const NodeArrays& grid, const std::vector<float>& values,
                     const std::array<uint64_t, 3>& node, const IsThere& isThere) const {
@@ -173,14 +173,23 @@ class NodesAround {
       at += planes[axis] * strides_[axis];
     }
     if (!isThere(at)) return values[at];
-    double sum = values[at];
+    const double value = values[at];
+    const auto hasOtherSign = [&](size_t cell) { return isThere(cell) && value * values[cell] < 0; };
+    double sum = 0, most = 0;  // at most what a part differs by
+    bool signs_differ = false;
     for (size_t axis = 0; axis < 3; ++axis) {
       if (parts_[axis] == 1) continue;
       const auto parts = static_cast<double>(parts_[axis]);
       const double share = (static_cast<double>(2 * (node[axis] % parts_[axis]) + 1) - parts) / (2 * parts);
-      sum += share * changeAlong(axis, grid, values, {at, planes[axis]}, isThere);
+      const double change = changeAlong(axis, grid, values, {at, planes[axis]}, isThere);
+      sum += share * change;
+      most += 0.5 * std::abs(change);
+      signs_differ |= (planes[axis] > 0 && hasOtherSign(at - strides_[axis])) ||
+                      (planes[axis] + 2 < counts_[axis] && hasOtherSign(at + strides_[axis]));
     }
-    return static_cast<float>(sum);
+    // Changes along several axes add up.
+    if (!signs_differ && most > std::abs(value)) sum *= std::abs(value) / most;
+    return static_cast<float>(value + sum);
   }
 
   /// Whether one of the cells that a refined node lies in, or on the border of, is whole.
@@ -213,7 +222,7 @@ class NodesAround {
     if (before && after)
       return changeBetween(stepTo(at - stride, at, stride, grid, values),
                            stepTo(at + stride, at, stride, grid, values));
-    if (after && plane + 2 < count && isThere(at + 2 * stride))
+    if (after && isThere(at + 2 * stride))
       return changeAtBorder(values[at], stepTo(at + stride, at, stride, grid, values),
                             double{values[at + 2 * stride]} - values[at + stride]);
     if (before && plane > 1 && isThere(at - 2 * stride))
@@ -316,7 +325,7 @@ class RefinedSource final : public ForwardingGrid {
     const NodeBox around = aroundOf(block, box, true).box();
     const uint64_t of_plane = (around.i1 - around.i0) * (around.j1 - around.j0);
     const uint64_t planes =
-        std::max<uint64_t>(kNodes / of_plane, 6) - 5;  // five are read for the next planes, too
+        std::max<uint64_t>(kNodes / of_plane, 7) - 6;  // six are read for the next planes, too
     return planes * parts_[block][2];
   }
 

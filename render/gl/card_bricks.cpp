@@ -265,6 +265,7 @@ void CardBricks::setView(const GlProgram& program, const ProjectionSettings& set
   gl_.Uniform2f(program.uniform("picture"), width, height);
   gl_.Uniform2f(program.uniform("middle"), 0.5f * width, 0.5f * height);
   gl_.Uniform1i(program.uniform("per_pixel"), settings.per_pixel);
+  setRow("scale", fourOf(glm::vec3(view.scale)));
   if (!settings.light) return;
   const Light& light = *settings.light;
   const auto g0_squared = static_cast<float>(std::max(settings.light_g0 * settings.light_g0, 1e-30));
@@ -272,7 +273,6 @@ void CardBricks::setView(const GlProgram& program, const ProjectionSettings& set
   gl_.Uniform1i(program.uniform("light_at_viewer"), !light.towards);
   if (light.towards) setRow("light_towards", fourOf(glm::vec3(glm::normalize(*light.towards))));
   setRow("viewer", fourOf(glm::vec3(-view.forward)));
-  setRow("scale", fourOf(glm::vec3(view.scale)));
 }
 
 /// Sends what factors of opacity and light depend on; shadows only if they have changed, since they are large.

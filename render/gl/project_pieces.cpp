@@ -48,6 +48,7 @@ uint sideOfPlanes(uint p, vec3 position, mat3 a, float support) {
 
 // This is PixelLayers::boundsOver().
 vec2 boundsOver(vec2 from, vec2 to) {
+  if (!all(lessThanEqual(from, to))) return vec2(-3.4e38, 3.4e38);  // no numbers: anywhere
   ivec2 least = ivec2(clamp(from, vec2(0.0), picture - 1.0)) / LAYER_CELL, most = ivec2(clamp(to, vec2(0.0), picture - 1.0)) / LAYER_CELL;
   ivec2 cells = (ivec2(picture) + LAYER_CELL - 1) / LAYER_CELL;
   int begin = 0;

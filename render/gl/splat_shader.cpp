@@ -365,7 +365,7 @@ void main() {
     Record next = Record(vec4(0.0), vec4(0.0), vec2(0.0)), beyond = next;
     if (splat.part1.y < 0.0) {
       next = recordOf(n - 1 - COLOURED);
-      beyond = recordOf(n - 2 - COLOURED);
+      beyond = recordOf(max(n - 2 - COLOURED, 0));  // of the first splat's last record: not used
     }
     ColourRecord of_colours = ColourRecord(vec4(0.0), vec2(0.0));
 #if COLOURED

@@ -97,9 +97,10 @@ struct CacheReader::State {
   void opening(const OpenFiles& open_files) const {
     try {
       open_files();
-    } catch (const Error&) {
+    } catch (const Error& error) {
       if (identityOf(cache) == identity) throw;
-      throw Error("{}: has been replaced or removed since it was opened; open it again", cache.string());
+      throw Error("{}: has been replaced or removed since it was opened; open it again ({})", cache.string(),
+                  error.what());
     }
   }
 

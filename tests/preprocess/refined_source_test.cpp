@@ -132,15 +132,19 @@ bool isWhole(const GridBlock& block, const Index& cell, const IsThere& is_there)
 /// Why some nodes are gone: blanked, by value, not finite or not in a place.
 enum class Gone { kBlanked, kByValue, kNotFinite, kNowhere };
 
-std::unique_ptr<FunctionGridSource> gridWithGone(const Index& counts, uint64_t seed, Gone how) {
-  return unevenGrid(counts, [=](const GridNode& node, NodeValues& values) {
-    std::mt19937_64 random(seed + node.i + 20 * node.j + 400 * node.k);
-    if (random() % 8 != 0) return;
-    if (how == Gone::kBlanked) values.blank = true;
-    if (how == Gone::kByValue) values.scalars[0] = -999;
-    if (how == Gone::kNotFinite) values.scalars[0] = kNone;
-    if (how == Gone::kNowhere) values.position.y = kNone;
-  });
+std::unique_ptr<FunctionGridSource> gridWithGone(const Index& counts, uint64_t seed, Gone how,
+                                                 Centring centring = Centring::kNode) {
+  return unevenGrid(
+      counts,
+      [=](const GridNode& node, NodeValues& values) {
+        std::mt19937_64 random(seed + node.i + 20 * node.j + 400 * node.k);
+        if (random() % 8 != 0) return;
+        if (how == Gone::kBlanked) values.blank = true;
+        if (how == Gone::kByValue) values.scalars[0] = -999;
+        if (how == Gone::kNotFinite) values.scalars[0] = kNone;
+        if (how == Gone::kNowhere) values.position.y = kNone;
+      },
+      centring);
 }
 
 TEST(RefinedSource, DrawsThePartsOfCellsThatAreDrawn) {
@@ -181,21 +185,24 @@ TEST(RefinedSource, DrawsThePartsOfCellsThatAreDrawn) {
 TEST(RefinedSource, ReadsLargeBoxesByPlanes) {
   const std::array<uint32_t, 1> scalar{0};
   const Refinement cut(std::vector<CellCuts>{{1, 1, 3}});
-  const auto fine = refined(gridWithGone({250, 200, 7}, 77, Gone::kBlanked), cut);
-  const GridBlock& block = fine->description().blocks[0];
-  const NodeArrays whole = allNodes(*fine, 0);
-  ASSERT_EQ(whole.x.size(), block.nodes());
-  NodeArrays plane;
-  for (uint64_t k = 0; k < block.nk; ++k) {
-    fine->read(0, {0, block.nj, k, k + 1}, scalar, plane);
-    const auto expectPart = [&](const auto& part, const auto& of) {
-      EXPECT_TRUE(std::equal(part.begin(), part.end(), of.begin() + static_cast<ptrdiff_t>(k * part.size())))
-          << k;
-    };
-    expectPart(plane.x, whole.x);
-    expectPart(plane.z, whole.z);
-    expectPart(plane.scalars[0], whole.scalars[0]);
-    expectPart(plane.blank, whole.blank);
+  for (const Centring centring : {Centring::kNode, Centring::kCell}) {
+    const auto fine = refined(gridWithGone({250, 200, 7}, 77, Gone::kBlanked, centring), cut);
+    const GridBlock& block = fine->description().blocks[0];
+    const NodeArrays whole = allNodes(*fine, 0);
+    ASSERT_EQ(whole.x.size(), block.nodes());
+    NodeArrays plane;
+    for (uint64_t k = 0; k < block.nk; ++k) {
+      fine->read(0, {0, block.nj, k, k + 1}, scalar, plane);
+      const auto expectPart = [&](const auto& part, const auto& of) {
+        EXPECT_TRUE(
+            std::equal(part.begin(), part.end(), of.begin() + static_cast<ptrdiff_t>(k * part.size())))
+            << k;
+      };
+      expectPart(plane.x, whole.x);
+      expectPart(plane.z, whole.z);
+      expectPart(plane.scalars[0], whole.scalars[0]);
+      expectPart(plane.blank, whole.blank);
+    }
   }
 }
 
@@ -253,8 +260,24 @@ TEST(RefinedSource, PartsOfCellsHaveItsMeanAndNoNewExtremes) {
       EXPECT_GE(value, least) << i;
       EXPECT_LE(value, most) << i;
     }
-    EXPECT_NEAR(sum, values[i], 1e-6 * 2e6) << i;
+    EXPECT_NEAR(sum, values[i], 1e-6 * std::max(1.0, std::abs(values[i]))) << i;
   }
+}
+
+TEST(RefinedSource, PartsOfPositiveCellsArePositive) {
+  // Along each axis alone all parts are; the changes along three add up.
+  const auto valueOf = [](const Index& n) { return std::pow(2.5, n[0] + n[1] + n[2]); };
+  const auto fine = refined(growingCells(valueOf), 4);
+  const NodeArrays nodes = allNodes(*fine, 0);
+  const GridBlock& block = fine->description().blocks[0];
+  double of_cell = 0;
+  forEachIndex(block, [&](const Index& n) {
+    if (n[0] + 1 == block.ni || n[1] + 1 == block.nj || n[2] + 1 == block.nk) return;
+    const float value = nodes.scalars[0][atOf(block, n)];
+    EXPECT_GE(value, 0) << n[0] << ' ' << n[1] << ' ' << n[2];
+    if (n[0] / 4 == 3 && n[1] / 4 == 1 && n[2] / 4 == 2) of_cell += double{value} / 64;
+  });
+  EXPECT_NEAR(of_cell, valueOf({3, 1, 2}), 1e-5 * of_cell);
 }
 
 TEST(RefinedSource, PartsOfCellsLeaveOutWhatHasNoValue) {

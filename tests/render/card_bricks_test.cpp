@@ -152,16 +152,17 @@ TEST_P(CardBricksWith, AreCutAndClassifiedAsByTheProcessor) {
     o.light->shadow = o.light->ambient_occlusion = 0.7f;
   };
   const auto steep = [](FrameOptions& o) { o.gradient_opacity = {{0, 0}, {0.3, 0.2}, {0.8, 1}}; };
-  const Addition additions[] = {{"clip", [&](FrameOptions& o) { clip(o); }},
-                                {"layers", [&](FrameOptions& o) { putLayers(o); }},
-                                {"shadows", shadows},
-                                {"gradient opacity", steep},
-                                {"all", [&](FrameOptions& o) {
-                                   clip(o);
-                                   putLayers(o);
-                                   shadows(o);
-                                   steep(o);
-                                 }}};
+  const Addition additions[] = {
+      {"gradient opacity", steep},  // first: before lit pictures have set what light needs
+      {"clip", [&](FrameOptions& o) { clip(o); }},
+      {"layers", [&](FrameOptions& o) { putLayers(o); }},
+      {"shadows", shadows},
+      {"all", [&](FrameOptions& o) {
+         clip(o);
+         putLayers(o);
+         shadows(o);
+         steep(o);
+       }}};
   const Camera parallel = camera("iso"), eye = camera("iso", Projection::kPerspective);
   for (const Addition& addition : additions) {
     const std::string what = fmt::format("{}, {}", kind, addition.name);

@@ -347,9 +347,9 @@ TEST(Series, SaysThatItsCacheHasBeenReplacedOrRemoved) {
   const std::string replaced =
       cache.string() + ": has been replaced or removed since it was opened; open it again";
   fs::rename(cache, folder / "earlier");
-  EXPECT_EQ(refusal(), replaced);
+  EXPECT_TRUE(refusal().starts_with(replaced)) << refusal();
   fs::create_directory(cache);
-  EXPECT_EQ(refusal(), replaced);
+  EXPECT_TRUE(refusal().starts_with(replaced)) << refusal();
 }
 
 TEST(Series, NearestStepInTime) {

@@ -12,9 +12,6 @@ curvisplat_find(nlohmann_json)
 curvisplat_find(PNG)
 curvisplat_find(tinyexr)
 curvisplat_find(hwy)
-# SSSE3 without SSE4.1 is that of two years' processors (2006 and 2007), which take the scalar code: the vectors' code is compiled
-# for one instruction set less.
-set_property(TARGET hwy::hwy APPEND PROPERTY INTERFACE_COMPILE_DEFINITIONS HWY_DISABLED_TARGETS=HWY_SSSE3)
 curvisplat_find(pugixml)
 curvisplat_find(ZLIB)
 curvisplat_find(CGNS)

@@ -11,6 +11,8 @@
 #include <span>
 #include <string>
 
+#include "stream/base/error.h"
+
 namespace curvisplat {
 
 struct Machine {

@@ -238,9 +238,18 @@ std::unique_ptr<DataSource> openInAnyOrder(const OpenGridOptions& options) {
   }
 }
 
-/// Leaves out the files of names (PLOT3D's .nam), which are found beside their function files, where others are chosen, too.
+/// Leaves out files of names (PLOT3D's .nam) that are found beside the function files, since these are chosen, too.
 void leaveOutNames(OpenGridOptions& options) {
-  const auto isOfNames = [](const std::filesystem::path& file) { return file.extension() == ".nam"; };
+  std::vector<std::filesystem::path> files = options.solutions;
+  files.push_back(options.grid);
+  const auto isOfNames = [&](const std::filesystem::path& names) {
+    std::error_code none_there;
+    return names.extension() == ".nam" &&
+           std::any_of(files.begin(), files.end(), [&](std::filesystem::path file) {
+             return file.extension() != ".nam" &&
+                    std::filesystem::equivalent(file.replace_extension(".nam"), names, none_there);
+           });
+  };
   std::erase_if(options.solutions, isOfNames);
   if (!isOfNames(options.grid) || options.solutions.empty()) return;
   options.grid = options.solutions.front();
@@ -255,7 +264,7 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   if (complete.temporary_folder.empty()) complete.temporary_folder = systemTemporaryFolder();
   std::unique_ptr<DataSource> source =
       cutCurved(openInAnyOrder(complete), options.cut_curved.value_or(true), complete.temporary_folder);
-  chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
+  chosenTimeStep(complete.grid.string(), source->description().times, options.time_step);
   return source;
 }
 

@@ -36,7 +36,7 @@ class LoneGrid : public UsageError {
 };
 
 /// Indices into description.scalars for `names`; each is a name, the number of a function file's variable,
-/// or a PLOT3D function number. Without names: the first scalar; LoneGrid if the files hold none. Throws UsageError
+/// or a PLOT3D function number. Without names: the first scalar; LoneGrid if the files hold none, named or not. Throws UsageError
 /// that lists the available names.
 std::vector<uint32_t> scalarsNamed(const GridDescription& description, const std::vector<std::string>& names);
 
