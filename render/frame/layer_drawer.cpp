@@ -75,9 +75,9 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
   for (const Curves& curves : options.scene->curves) bytes += kPointBytes * curves.set->positions.size();
   // In the grid's cells or in the field of splats, one after the other.
   if (!options.scene->isovalues.empty())
-    bytes +=
-        std::max(IsoMeshes::bytes(cache_.manifest(), coloured_by_.has_value()),
-                 isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels());
+    bytes += std::max(
+        IsoMeshes::bytes(cache_.manifest(), coloured_by_.has_value(), options.scene->isovalues.size()),
+        isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels());
   if (!options.scene->grid_surfaces.empty())
     bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
@@ -168,7 +168,8 @@ const IsoMeshes::Meshes* LayerDrawer::isoMeshes(const FramePlan& plan, const Fra
   } catch (const DamagedBrick&) {
     iso_meshes_.release();
     if (!options.keep_going) throw;
-    return nullptr;  // sampling says which bricks are damaged, and what replaces them
+    // Sampling names the damaged bricks that its rays meet, and what replaces them.
+    return nullptr;
   }
 }
 

@@ -37,8 +37,8 @@ class Contour {
     for (const GridNodes::Block& block : nodes_.blocks())
       if (!addBlock(block)) return std::nullopt;
     for (glm::vec3& normal : mesh_.normals) {
-      const float length = glm::length(normal);
-      normal = length > 0 ? normal / length : glm::vec3(0, 0, 1);
+      const double length = glm::length(glm::dvec3(normal));  // its square may be beyond single precision
+      normal = length > 0 ? glm::vec3(glm::dvec3(normal) / length) : glm::vec3(0, 0, 1);
     }
     return std::move(mesh_);
   }

@@ -12,6 +12,11 @@ namespace {
 /// from.
 constexpr uint64_t kTriangleBytes = 64;
 
+/// The most triangles of all isosurfaces together: each cell has few of each.
+uint64_t mostTriangles(uint64_t nodes, size_t values) {
+  return std::min(IsoMeshes::kMaxTriangles, 4 * nodes * values);
+}
+
 bool isSame(const ClipPlane& a, const ClipPlane& b) {
   return a.point == b.point && a.normal == b.normal;
 }
@@ -24,11 +29,9 @@ bool IsoMeshes::Wanted::operator==(const Wanted& wanted) const {
          std::equal(planes.begin(), planes.end(), wanted.planes.begin(), wanted.planes.end(), isSame);
 }
 
-uint64_t IsoMeshes::bytes(const Manifest& manifest, bool two_scalars) {
+uint64_t IsoMeshes::bytes(const Manifest& manifest, bool two_scalars, size_t values) {
   if (!canBeOf(manifest)) return 0;
-  // Each cell has at most some triangles of each value.
-  return GridNodes::bytes(manifest, two_scalars) +
-         kTriangleBytes * std::min(kMaxTriangles, 4 * manifest.nodes);
+  return GridNodes::bytes(manifest, two_scalars) + kTriangleBytes * mostTriangles(manifest.nodes, values);
 }
 
 const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& wanted,
@@ -53,7 +56,7 @@ const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& w
 
 /// Makes the meshes, and keeps none of them where they have too many triangles together.
 void IsoMeshes::contour(const Wanted& wanted) {
-  const uint64_t most = std::min(kMaxTriangles, 4 * uint64_t{nodes_->size()});
+  const uint64_t most = mostTriangles(nodes_->size(), wanted.values.size());
   Meshes meshes;
   uint64_t left = most;
   for (const double value : wanted.values) {

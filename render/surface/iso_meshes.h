@@ -39,7 +39,7 @@ class IsoMeshes {
   /// Whether isosurfaces of the cache may be made so.
   static bool canBeOf(const Manifest& manifest) { return GridNodes::canBeOf(manifest); }
   /// About the most that they take, with what is kept.
-  static uint64_t bytes(const Manifest& manifest, bool two_scalars);
+  static uint64_t bytes(const Manifest& manifest, bool two_scalars, size_t values);
 
   /// The meshes; null where they are of another cache than canBeOf() says, or have too many triangles. Valid until the next call. Throws as
   /// GridNodes does.

@@ -6,7 +6,9 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
+#include <utility>
 
 namespace curvisplat {
 namespace {
@@ -178,21 +180,72 @@ class Joiner {
     const size_t step = std::max<size_t>(1, missing.size() / kVoters);
     for (size_t n = 0; n < missing.size(); n += step)
       if (const auto node = nearest(*expected(face, missing[n]))) vote(missing[n], *node, votes);
-    // The first of two with the same votes counts: those that are not collapsed come first.
+    const Taken best = bestOf(face, missing, mapsFor(face, votes));
+    for (const auto& [node, same] : best.nodes) same_[node] = static_cast<uint32_t>(same);
+    return best.nodes.size();
+  }
+
+  /// The maps with the most votes, and those that lay whole faces on one another: where cells are thin and grid lines bend, the
+  /// nearest node is not the one that is meant.
+  std::vector<FaceMap> mapsFor(const BlockFace& face, const std::map<FaceMap, size_t>& votes) const {
+    constexpr size_t kMostVoted = 4;
     std::vector<std::pair<FaceMap, size_t>> sorted(votes.begin(), votes.end());
-    std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
-      return std::tuple(b.second, collapsed(a.first)) < std::tuple(a.second, collapsed(b.first));
-    });
-    for (size_t n = 0; n < std::min<size_t>(sorted.size(), 4); ++n)
-      if (const size_t found = follow(face, missing, sorted[n].first)) return found;
-    return 0;
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const auto& a, const auto& b) { return a.second > b.second; });
+    std::vector<FaceMap> maps;
+    std::set<BlockFace> onto{face, {face.block, face.axis, !face.at_end}};
+    for (size_t n = 0; n < std::min(sorted.size(), kMostVoted); ++n) {
+      maps.push_back(sorted[n].first);
+      onto.insert(sorted[n].first.to);
+    }
+    for (const BlockFace& to : onto) addWhole(to, maps);
+    return maps;
+  }
+  void addWhole(const BlockFace& to, std::vector<FaceMap>& maps) const {
+    const auto& size = blocks_[to.block].size;
+    const auto last_u = static_cast<int64_t>(size[to.u()]) - 1,
+               last_v = static_cast<int64_t>(size[to.v()]) - 1;
+    for (const int of : {0, 1})
+      for (const int u : {1, -1})
+        for (const int v : {1, -1})
+          maps.push_back(
+              {to, {MappedAxis{of, u, u > 0 ? 0 : last_u}, MappedAxis{1 - of, v, v > 0 ? 0 : last_v}}});
+  }
+
+  /// The nodes that a map finds.
+  struct Taken {
+    std::vector<std::pair<size_t, size_t>> nodes;  // of the face, and the one there
+    double farthest = 0;                           // cells
+  };
+  /// The map that finds the most nodes; of several the least collapsed, then the nearest.
+  Taken bestOf(const BlockFace& face, const std::vector<Place>& missing,
+               const std::vector<FaceMap>& maps) const {
+    Taken best;
+    int best_collapsed = 0;
+    for (const FaceMap& map : maps) {
+      Taken one = taken(face, missing, map);
+      if (one.nodes.empty()) continue;
+      const int of_one = collapsed(map);
+      const bool is_first = best.nodes.empty();
+      if (is_first || std::tuple(best.nodes.size(), of_one, one.farthest) <
+                          std::tuple(one.nodes.size(), best_collapsed, best.farthest)) {
+        best = std::move(one);
+        best_collapsed = of_one;
+      }
+    }
+    return best;
   }
   static int collapsed(const FaceMap& map) { return (map.along[0].sign == 0) + (map.along[1].sign == 0); }
 
   /// Votes for all maps that take a place to a node.
   void vote(const Place& place, size_t node, std::map<FaceMap, size_t>& votes) const {
     constexpr std::array<std::pair<int, int>, 5> kWays{{{0, 1}, {0, -1}, {1, 1}, {1, -1}, {0, 0}}};
-    for (const BlockFace& to : faces_) {
+    // Each block has six faces.
+    const auto block = std::upper_bound(blocks_.begin(), blocks_.end(), node,
+                                        [](size_t n, const NodeLattice3& b) { return n < b.first; }) -
+                       1;
+    const size_t first = 6 * static_cast<size_t>(block - blocks_.begin());
+    for (const BlockFace& to : std::span(faces_).subspan(first, 6)) {
       const auto there = placeOn(to, node);
       if (!there) continue;
       for (const auto& [of_u, sign_u] : kWays)
@@ -216,19 +269,19 @@ class Joiner {
     return Place{index(face.u()), index(face.v())};
   }
 
-  /// Takes the nodes that a map leads to; how many.
-  size_t follow(const BlockFace& face, const std::vector<Place>& missing, const FaceMap& map) {
-    std::vector<std::pair<size_t, size_t>> found;
+  Taken taken(const BlockFace& face, const std::vector<Place>& missing, const FaceMap& map) const {
+    Taken out;
     for (const Place& place : missing) {
       const auto to = nodeAt(map.to, {map.along[0].at(place), map.along[1].at(place)});
       if (!to || !is_there_[*to]) continue;
       const Expected there = *expected(face, place);
-      if (inCells(*to, there) <= kNear ||
-          glm::length(at_(*to) - there.at) <= kMaxAside * glm::length(there.cell[0]))
-        found.push_back({*nodeAt(face, place), *to});
+      const double away = inCells(*to, there);
+      if (!(away <= kNear) && !(glm::length(at_(*to) - there.at) <= kMaxAside * glm::length(there.cell[0])))
+        continue;
+      out.nodes.push_back({*nodeAt(face, place), *to});
+      out.farthest = std::max(out.farthest, away);
     }
-    for (const auto& [node, same] : found) same_[node] = static_cast<uint32_t>(same);
-    return found.size();
+    return out;
   }
 
   const std::span<const NodeLattice3> blocks_;

@@ -1,8 +1,9 @@
 // Finds the nodes that share a splat: faces of blocks that meet, or one that is folded, closed or collapsed onto a line. The splat is
 // stored as one of the nodes; the others have none, and are found by where the grid lines that lead to their face would go on to.
 //
-// Node by node the nearest one may be the wrong one, where cells are much thinner than they are long. So the nodes of a face vote for how
-// its lattice lies on that of another face (or the same): turned, mirrored, shifted or collapsed; all follow the majority.
+// Node by node the nearest one may be the wrong one, where cells are much thinner than they are long. So maps are tried of how the
+// lattice of a face lies on that of another (or on its own): whole, or, as its nodes vote, turned, mirrored, shifted or collapsed. The
+// one counts that finds the most nodes.
 #pragma once
 
 #include <array>

@@ -79,10 +79,9 @@ class PointChooser {
     }
     if (turns) {
       begin(before_);
-      before_ = chosen_;
       turnsBefore(point);
     }
-    way_ = way2 > 0 ? way : way_;
+    way_ = way2 <= 0 ? way_ : way;  // NaN: before the near plane
     before_ = point;
     return turns;
   }
@@ -165,6 +164,26 @@ Capsule SceneTriangles::cutCapsule(size_t curve, uint32_t point) const {
   const CapsuleLook& look = lookOf(curve);
   const float radius = std::max(look.radiusAt(capsule.a.value), look.radiusAt(capsule.b.value));
   return guarded(capsule, std::max(kGuard, kGuardRadii * radius));
+}
+
+std::pair<float, float> SceneTriangles::partsOf(size_t curve, uint32_t point, const Capsule& cut) const {
+  const uint32_t from = beginOf(curve, point);
+  const auto isSame = [](const ScreenVertex& a, const ScreenVertex& b) {
+    return a.x == b.x && a.y == b.y && a.value == b.value;
+  };
+  if (isSame(cut.a, vertices_[curve][from]) && isSame(cut.b, vertices_[curve][point])) return {0.0f, 1.0f};
+  const glm::dvec3 a = inView(curve, from), way = inView(curve, point) - a;
+  const double length2 = glm::dot(way, way);
+  if (!(length2 > 0)) return {0.0f, 1.0f};
+  const bool perspective = view_.projection == Projection::kPerspective;
+  const auto partAt = [&](const ScreenVertex& at) {
+    const double z = perspective ? -1.0 / double{at.value} : double{at.value} + depth_origin_;
+    const double per_pixel = (perspective ? z : 1.0) / view_.focal_px;
+    const glm::dvec3 place((double{at.x} - 0.5 * view_.size.width) * per_pixel,
+                           (double{at.y} - 0.5 * view_.size.height) * per_pixel, z);
+    return static_cast<float>(std::clamp(glm::dot(place - a, way) / length2, 0.0, 1.0));
+  };
+  return {partAt(cut.a), partAt(cut.b)};
 }
 
 CapsuleLook SceneTriangles::makeLook(const Curves& curves) const {

@@ -81,6 +81,8 @@ class SceneTriangles {
     };
     return isNear(whole.a) && isNear(whole.b) ? whole : cutCapsule(curve, point);
   }
+  /// The parts of the whole capsule at which `cut`, as of capsuleOf(), begins and ends.
+  std::pair<float, float> partsOf(size_t curve, uint32_t point, const Capsule& cut) const;
   const CapsuleLook& lookOf(size_t curve) const { return looks_[curve - scene_.surfaces.size()]; }
   /// The depth that PixelLayers has, of a value at a pixel.
   float depthOf(float value, float x, float y) const;

@@ -245,8 +245,9 @@ void SurfaceShader::shadeCapsule(const Spot& spot, Point& point) const {
   point.colour = curves.colour;
   const std::vector<float>& values = curves.set->values;
   if (values.empty()) return;
+  const auto [from, to] = triangles_.partsOf(curve, end, capsule);
   const float begin = values[triangles_.beginOf(curve, end)];
-  const float scalar = begin + place.along * (values[end] - begin);
+  const float scalar = begin + (from + place.along * (to - from)) * (values[end] - begin);
   if (!std::isnan(scalar))
     point.colour = (curves.colours ? *curves.colours : tables_.colours).at(double{scalar});
 }

@@ -391,6 +391,7 @@ TEST_F(FurtherScalarTest, OneIsAddedForItsOpacities) {
   ASSERT_TRUE(eventually([] {
     return runProgram({"info", "one.splats"}).out.find("volume") != std::string::npos;
   }));
+  ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
   save();
   const Image two = saveAndCopy();
   const auto commands = close();

@@ -129,28 +129,32 @@ TEST_F(IsoMeshesTest, PeaksAtAllPlacesAreClosed) {
 }
 
 TEST_F(IsoMeshesTest, AClosedBlockHasNoSeam) {
-  // A ring: its first and its last nodes along i are the same ones.
-  const auto place = [](const GridNode& n) {
-    const double angle = 2 * std::numbers::pi * double(n.i) / 40, radius = 1 + 0.1 * double(n.j);
-    return glm::dvec3(radius * std::cos(angle), radius * std::sin(angle), 0.1 * double(n.k));
-  };
-  const CacheReader cache = converted(
-      [&](const GridNode& n) {
-        const GridNode same{0, n.i % 40, n.j, n.k};
-        const glm::dvec3 at = place(same), around(std::hypot(at.x, at.y) - 1.5, at.z - 0.5, 0);
-        return NodeValues{at, {static_cast<float>(glm::length(around))}};
-      },
-      {41, 11, 11});
-  ASSERT_LT(cache.manifest().splats, cache.manifest().nodes);
-  const GridNodes nodes(cache, 0, std::nullopt, kNeverStopped);
-  ASSERT_TRUE(nodes.areComplete());
-  const auto mesh = contourCells(nodes, 0.3, {}, 100000);
-  ASSERT_TRUE(mesh);
-  ASSERT_GT(mesh->triangles.size(), 1000u);
-  EXPECT_EQ(openEdges(*mesh), 0u);
-  for (uint32_t n = 0; n < mesh->positions.size(); ++n) {
-    const glm::dvec3 at = corner(*mesh, n);
-    EXPECT_NEAR(std::hypot(std::hypot(at.x, at.y) - 1.5, at.z - 0.5), 0.3, 0.01);
+  // Rings: their first and their last nodes along i are the same ones. Straight on from the last cell but one lies another layer,
+  // where layers are thin.
+  for (const auto& [inner, layer] : {std::pair{1.0, 0.1}, {3.0, 0.1}, {10.0, 0.1}, {1.0, 0.005}}) {
+    const auto place = [inner = inner, layer = layer](const GridNode& n) {
+      const double angle = 2 * std::numbers::pi * double(n.i) / 40, radius = inner + layer * double(n.j);
+      return glm::dvec3(radius * std::cos(angle), radius * std::sin(angle), 0.1 * double(n.k));
+    };
+    // The distance from a circle in the middle, as if layers were 0.1 thick.
+    const auto distance = [inner = inner, layer = layer](const glm::dvec3& at) {
+      return std::hypot((std::hypot(at.x, at.y) - inner - 5 * layer) * 0.1 / layer, at.z - 0.5);
+    };
+    const CacheReader cache = converted(
+        [&](const GridNode& n) {
+          const glm::dvec3 at = place({0, n.i % 40, n.j, n.k});
+          return NodeValues{at, {static_cast<float>(distance(at))}};
+        },
+        {41, 11, 11});
+    ASSERT_LT(cache.manifest().splats, cache.manifest().nodes);
+    const GridNodes nodes(cache, 0, std::nullopt, kNeverStopped);
+    ASSERT_TRUE(nodes.areComplete());
+    const auto mesh = contourCells(nodes, 0.3, {}, 100000);
+    ASSERT_TRUE(mesh);
+    ASSERT_GT(mesh->triangles.size(), 1000u);
+    EXPECT_EQ(openEdges(*mesh), 0u) << inner << ' ' << layer;
+    for (uint32_t n = 0; n < mesh->positions.size(); ++n)
+      EXPECT_NEAR(distance(corner(*mesh, n)), 0.3, layer < 0.1 ? 0.05 : 0.02) << inner << ' ' << layer;
   }
 }
 

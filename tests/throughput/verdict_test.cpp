@@ -30,7 +30,7 @@ TEST(Machine, SaysBeforehandWhenOthersUseIt) {
   }
   machine.load = 2.5;
   EXPECT_EQ(machine.busyNote(),
-            "the machine is busy (load 2.5 in the last minute, 4 cores): these figures will be too low; end "
+            "the machine is busy (load 2.5 in the last minute, 4 cores): these figures will be wrong; end "
             "other programs or wait, and measure again");
   EXPECT_EQ(machine.toJson()["load"], 2.5);
   const Machine here = Machine::here(".");

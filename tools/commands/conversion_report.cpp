@@ -58,14 +58,16 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
   const auto size = is_measured ? byteText : estimatedBytes;
   const std::string of_steps = forecast.steps > 1 ? fmt::format(" in each of {} steps", forecast.steps) : "";
   if (forecast.sampled > 0)
-    fmt::print("{} samples{}; estimated from {} of them, converted in {:.3g} s:\n", forecast.samples,
-               of_steps, forecast.sampled, forecast.sampling_seconds);
+    fmt::print("{} samples{}; estimated from {} of them, converted in {}:\n", forecast.samples, of_steps,
+               forecast.sampled, estimatedTime(forecast.sampling_seconds));
   else
     fmt::print("{} samples; estimated from its cells, and from conversions of other unstructured grids:\n",
                forecast.samples);
-  printLine("  cache      {} in {}{}, {:.{}g} bytes per sample{}", size(forecast.cache_bytes),
-            output.string(), freeText(output), static_cast<double>(forecast.cache_bytes) / samples,
-            is_measured ? 3 : 2, forecast.steps > 1 ? " and step" : "");
+  const double each = static_cast<double>(forecast.cache_bytes) / samples;
+  printLine("  cache      {} in {}{}, {} bytes per sample{}", size(forecast.cache_bytes), output.string(),
+            freeText(output),
+            each >= 100 ? fmt::format("{:.0f}", each) : fmt::format("{:.{}g}", each, is_measured ? 3 : 2),
+            forecast.steps > 1 ? " and step" : "");
   const std::filesystem::path temporary = temporaryFolderOf(options);
   printLine("  temporary  {} in {}{}", size(forecast.temporary_bytes), temporary.string(),
             freeText(temporary));

@@ -111,6 +111,7 @@ ConversionServices conversionServices(ValuePrecision precision) {
     try {
       return keptCacheOf(files, progress, kept, {}, precision);
     } catch (const LoneGrid&) {
+      if (files.size() > 1) throw;
       throw Error(
           "{}: has no values, only coordinates: choose the solution, too (Ctrl + click takes several files)",
           files.front().filename().string());

@@ -277,7 +277,7 @@ namespace {
 glm::dvec3 placeForOrbit(const Camera& camera, double degrees, const PictureChoice::Framing& framing) {
   double distance = 0;
   for (unsigned n = 0; n < kDefaultFrames; ++n) {
-    Camera turned = orbited(camera, degrees * n / kDefaultFrames);
+    Camera turned = orbited(camera, std::clamp(degrees, -360.0, 360.0) * n / kDefaultFrames);
     turned.fit(framing.box.lower, framing.box.upper, framing.size);
     distance = std::max(distance, glm::distance(turned.position, turned.focal_point));
   }

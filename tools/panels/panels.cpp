@@ -109,7 +109,7 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
   cuts_.draw(state, actions);
   std::optional<size_t> seen = state.markers.size();  // a click in the picture unfolds nothing
   if (const Section open{"Markers", seen, state.markers.size()})
-    drawMarkers(state, cache_.manifest().globe.has_value(), actions);
+    drawMarkers(state, cache_.manifest().globe, actions);
 }
 
 void Panels::drawTime(PanelActions& actions, Playback& playback) {
@@ -250,7 +250,7 @@ void drawLight(ViewState& state, PanelActions& actions) {
     state.light_strength = std::round(100 * state.light_strength) / 100;
   hint("the rest is the same everywhere");
   bool at_viewer = !state.lightFrom();
-  ImGui::BeginDisabled(!state.light_direction && state.shadow > 0);  // which needs a direction
+  ImGui::BeginDisabled(state.shadow > 0);  // which needs a direction
   if (option("light at the viewer", at_viewer)) {
     state.light_direction = at_viewer ? std::nullopt : std::optional(Light::kShadowsFrom);
     actions.changed = true;

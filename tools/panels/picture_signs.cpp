@@ -130,19 +130,29 @@ bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Manifest& mani
 
 namespace {
 
+/// Returns the place without the exaggeration of heights.
+glm::dvec3 unstretched(const glm::dvec3& point, const std::optional<Globe>& globe) {
+  if (!globe) return point;
+  Globe plain = *globe;
+  plain.vertical_scale = 1;
+  return plain.placeAt(globe->geographic(point));
+}
+
 /// Draws the distance between two markers, along a straight line and without --scale.
-void drawDistance(const Marker& from, const Marker& to, bool on_globe) {
-  const std::string text = fmt::format("{} to {}: {:.5g}{}", from.name, to.name,
-                                       glm::distance(from.point, to.point), on_globe ? " km" : "");
+void drawDistance(const Marker& from, const Marker& to, const std::optional<Globe>& globe) {
+  const std::string text = fmt::format(
+      "{} to {}: {:.5g}{}", from.name, to.name,
+      glm::distance(unstretched(from.point, globe), unstretched(to.point, globe)), globe ? " km" : "");
   ImGui::TextDisabled("%s", text.c_str());
   nameWidget("distance " + text);
-  hint(on_globe ? "along a straight line, through the Earth"
-                : "along a straight line, in the units of the coordinates");
+  hint(!globe            ? "along a straight line, in the units of the coordinates"
+       : globe->sphere() ? "along a straight line, through the Earth"
+                         : "along a straight line");
 }
 
 }  // namespace
 
-void drawMarkers(ViewState& state, bool on_globe, PanelActions& actions) {
+void drawMarkers(ViewState& state, const std::optional<Globe>& globe, PanelActions& actions) {
   if (state.markers.empty()) ImGui::TextDisabled("Click into the picture to keep a value.");
   size_t removed = state.markers.size();
   for (size_t n = 0; n < state.markers.size(); ++n) {
@@ -162,7 +172,7 @@ void drawMarkers(ViewState& state, bool on_globe, PanelActions& actions) {
                                          marker.point.y, marker.point.z)
                                  .c_str());
     hint(fmt::format("block {}, i {}, j {}, k {}", marker.block + 1, marker.i, marker.j, marker.k).c_str());
-    if (n > 0) drawDistance(state.markers[n - 1], marker, on_globe);
+    if (n > 0) drawDistance(state.markers[n - 1], marker, globe);
     ImGui::PopID();
   }
   if (removed == state.markers.size()) return;

@@ -12,6 +12,7 @@
 
 #include "stream/cache/manifest.h"
 #include "stream/cache/probe.h"
+#include "stream/model/globe.h"
 #include "tools/panels/labels.h"
 #include "tools/view/view_state.h"
 #include "tools/window/window.h"
@@ -41,8 +42,8 @@ class PlaneHandles {
 double shiftAlong(const glm::dvec2& from, const glm::dvec2& to, const glm::dvec2& movement);
 
 /// Draws the list of markers, the places in the data that were clicked: names to edit, values, distances from one to the
-/// next, and buttons that remove one. `on_globe`: coordinates are kilometres.
-void drawMarkers(ViewState& state, bool on_globe, PanelActions& actions);
+/// next, and buttons that remove one. `globe`: of the data's manifest.
+void drawMarkers(ViewState& state, const std::optional<Globe>& globe, PanelActions& actions);
 
 /// Draws the markers over the picture.
 void drawMarkerSigns(const ViewState& state, const PlaceInWindow& place);

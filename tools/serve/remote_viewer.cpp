@@ -74,7 +74,7 @@ class RemoteViewer::Work {
     for (const uint64_t picture : inbox.shown) line_.shown(picture, clockSeconds());
     if (inbox.open) answer([&] { return caches_.cacheText(*inbox.open); });
     if (inbox.view) wanted_ = std::move(inbox.view);
-    if (inbox.pick && frames_ && !asked_.empty() && !(inbox.pick->hovers && picked_)) {
+    if (inbox.pick && frames_ && !asked_.empty() && !(inbox.pick->hovers && picked_ && !picked_->hovers)) {
       picked_ = inbox.pick;
       if (!values_) frames_->requestValues();
     }
@@ -114,7 +114,8 @@ class RemoteViewer::Work {
     const CacheReader& reader = caches_.reader(cache_);
     const glm::dvec2 pixel(pick.x * asked.picture.width, pick.y * asked.picture.height);
     const auto point = pointSeenAt(*values_, reader.manifest(), pixel, asked.data);
-    return caches_.markerText(cache_, {asked.state.variable, values_->step, pick.hovers}, point);
+    return caches_.markerText(cache_, {asked.state.variable, values_->step, pick.hovers, pick.x, pick.y},
+                              point);
   }
 
   /// Turns any error into one of the page: the state that it sent is wrong.
@@ -332,7 +333,7 @@ void RemoteViewer::receive(ClientMessage message) {
     if (auto* const one = std::get_if<HistogramRequest>(&message)) inbox_.histogram = std::move(*one);
     if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
     if (auto* const pick = std::get_if<PickRequest>(&message))
-      if (!pick->hovers || !inbox_.pick) inbox_.pick = *pick;  // a click is not lost
+      if (!pick->hovers || !inbox_.pick || inbox_.pick->hovers) inbox_.pick = *pick;  // a click is not lost
     if (auto* const command = std::get_if<CommandRequest>(&message)) inbox_.command = std::move(*command);
     if (auto* const shown = std::get_if<ShownReport>(&message))
       if (inbox_.shown.size() < kMaxReports) inbox_.shown.push_back(shown->picture);

@@ -67,7 +67,12 @@ size_t variableOf(const CacheReader& reader, const std::string& name, const std:
 ServedCaches::ServedCaches(const std::vector<fs::path>& paths, const FacesOf& faces) {
   const auto add = [&](std::string name, CacheReader reader) {
     ViewState first = firstViewOf(reader, "", kFirstSize);
-    std::vector<std::string> names = faces ? faces(reader) : std::vector<std::string>{};
+    std::vector<std::string> names;
+    if (faces) try {
+        names = faces(reader);
+      } catch (const Error& error) {
+        printMessage("warning: {}: its faces cannot be shown: {}", name, error.what());
+      }
     caches_.push_back({std::move(name), std::move(reader), std::move(first), std::move(names)});
   };
   std::vector<std::string> names;
@@ -168,7 +173,9 @@ std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& sc
   const auto found = point ? probe(reader, {&variable, 1}, *point) : std::nullopt;
   const char* const type = scalar.hovers ? "value" : "marker";
   if (!found && !scalar.hovers) throw UsageError("there is nothing at this place");
-  if (!found) return textOf({{"type", type}, {"cache", cache_number}, {"marker", nullptr}});
+  if (!found)
+    return textOf(
+        {{"type", type}, {"cache", cache_number}, {"x", scalar.x}, {"y", scalar.y}, {"marker", nullptr}});
   // As ViewState's JSON has markers, without a name.
   const Json marker = {{"point", jsonOf(*point)},
                        {"scalar", scalar.name},
@@ -178,7 +185,8 @@ std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& sc
                        {"i", found->i},
                        {"j", found->j},
                        {"k", found->k}};
-  return textOf({{"type", type}, {"cache", cache_number}, {"marker", marker}});
+  return textOf(
+      {{"type", type}, {"cache", cache_number}, {"x", scalar.x}, {"y", scalar.y}, {"marker", marker}});
 }
 
 std::string ServedCaches::coloursText(const ColoursRequest& request) {

@@ -45,6 +45,7 @@ class ServedCaches {
     std::string name;
     uint64_t step = 0;
     bool hovers = false;
+    double x = 0, y = 0;  // of the request, for the answer
   };
   std::string markerText(size_t cache, const MarkedScalar& scalar,
                          const std::optional<glm::dvec3>& point) const;

@@ -44,7 +44,7 @@ std::string Machine::busyNote() const {
   constexpr double kBusyShare = 0.25;  // of the cores; a desktop at rest has a load of 0.1 to 0.3
   if (!load || *load <= kBusyShare * cores) return {};
   return fmt::format(
-      "the machine is busy (load {:.1f} in the last minute, {}): these figures will be too low; end other "
+      "the machine is busy (load {:.1f} in the last minute, {}): these figures will be wrong; end other "
       "programs or wait, and measure again",
       *load, countText(cores, "core"));
 }

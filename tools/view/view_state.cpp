@@ -461,7 +461,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
     state.ambient_occlusion = occlusion->number(0, 1);
   if (const auto strength = fields.find("light_strength")) state.light_strength = strength->number(0, 1);
   if (const auto direction = fields.find("light_direction")) {
-    state.light_direction = direction->point();
+    state.light_direction = direction->point(1e100);  // its length is squared
     if (!(glm::length(*state.light_direction) > 0)) direction->fail("a direction");
   }
   if (const auto gradient = fields.find("gradient_opacity"); gradient && !gradient->text().empty())

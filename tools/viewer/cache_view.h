@@ -238,6 +238,7 @@ class CacheView {
   struct FoundIsosurface {
     Isosurface surface;
     std::optional<size_t> replaced;  // its place in the list; none: it is added
+    Isosurface before;               // what was there then
   };
   std::deque<std::future<FoundIsosurface>> finding_isosurfaces_;
   uint64_t values_asked_for_ = 0;  // request

@@ -141,11 +141,12 @@ void CacheView::findIsosurface(const std::string& scalar, std::optional<size_t> 
     function = state_.opacity_by ? state_.opacity_by->function : state_.function;
   finding_isosurfaces_.push_back(std::async(
       std::launch::async,
-      [cache = cache_.at(playback_.position()), variable, scalar, replaced, function = std::move(function)] {
+      [cache = cache_.at(playback_.position()), variable, scalar, replaced, function = std::move(function),
+       before = replaced ? state_.isosurfaces.at(*replaced) : Isosurface{}] {
         nameThisThread("isosurface");
         const WakeAtEnd at_the_end;
         const double value = middleOfSeen(histogramOf(cache, variable, function, kHistogramBins), function);
-        return FoundIsosurface{{scalar, value}, replaced};
+        return FoundIsosurface{{scalar, value}, replaced, before};
       }));
 }
 
@@ -155,11 +156,12 @@ void CacheView::takeIsosurfaces() {
     return;
   std::future<FoundIsosurface> done = std::move(finding_isosurfaces_.front());
   finding_isosurfaces_.pop_front();
-  const auto [surface, replaced] = done.get();
+  const auto [surface, replaced, before] = done.get();
   std::vector<Isosurface>& list = state_.isosurfaces;
   if (!replaced) {
     list.push_back(surface);
-  } else if (*replaced < list.size()) {
+  } else if (*replaced < list.size() && list[*replaced].scalar == before.scalar &&
+             list[*replaced].value == before.value) {
     list[*replaced].scalar = surface.scalar;
     list[*replaced].value = surface.value;
   }

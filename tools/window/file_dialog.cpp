@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 #include "tools/window/widgets.h"
 
 namespace curvisplat {
@@ -92,13 +93,16 @@ std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std
                                    const IsGridFolder& is_grid_folder) {
   std::vector<FolderEntry> entries;
   std::error_code error;
+  const bool is_for_data = std::ranges::find(endings, ".splats") != endings.end();
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     const std::string name = at->path().filename().string();
     if (name.starts_with('.')) continue;
     std::error_code ignored;
     const bool is_directory = at->is_directory(ignored);
     const bool is_folder = is_directory && !isOneFile(at->path(), is_grid_folder);
-    const bool is_listed = is_folder || is_directory || endings.empty() || fits(name, endings);
+    const bool has_ending = std::ranges::find(endings, at->path().extension().string()) != endings.end();
+    const bool is_listed = is_folder || endings.empty() ||
+                           (is_for_data ? is_directory || fits(name, endings) : !is_directory && has_ending);
     if (!is_listed) continue;
     const uint64_t bytes = is_directory ? 0 : at->file_size(ignored);
     entries.push_back({name, is_folder, ignored ? 0 : bytes});
@@ -200,7 +204,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
   if (accepts) chosen = accept();
-  if (chosen && chosen->purpose == Purpose::kOpenData) data_folder_ = folder_;
+  if (chosen && chosen->purpose == Purpose::kOpenData) data_folder_ = chosen->files.front().parent_path();
   if (cancels || chosen) {
     ImGui::CloseCurrentPopup();
     purpose_.reset();
@@ -211,7 +215,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
 
 float FileDialog::heightBelow() const {
   const float lines = *purpose_ == Purpose::kSavePicture ? 3.6f
-                      : *purpose_ == Purpose::kSaveMovie ? 5.6f
+                      : *purpose_ == Purpose::kSaveMovie ? 4.6f
                                                          : 2.6f;
   return lines * ImGui::GetFrameHeightWithSpacing();
 }
@@ -232,7 +236,7 @@ void FileDialog::drawHelp(bool saves) const {
     ImGui::TableSetupColumn("what it does");
     ImGui::TableHeadersRow();
     row("Return", saves ? "saves under the name" : "opens what is named or chosen; enters a folder");
-    row("Esc", "closes the dialog");
+    row("Esc", "shows the files again; there, closes the dialog");
     row("click", "chooses a file");
     row("double click", saves ? "saves under its name; enters a folder" : "opens a file; enters a folder");
     if (*purpose_ == Purpose::kOpenData) row("Ctrl + click", "chooses several: a grid and its solutions");
@@ -284,7 +288,7 @@ void FileDialog::drawRate() {
   movie_.frames_per_s = std::clamp(movie_.frames_per_s, 1.0, kMax);
   ImGui::SameLine();
   const uint64_t frames = movie_.frames(movie_.frames_per_s);
-  const std::string text = fmt::format("pictures a second: {} pictures, {:.1f} s", frames,
+  const std::string text = fmt::format("pictures a second: {}, {:.1f} s", countText(frames, "picture"),
                                        static_cast<double>(frames) / movie_.frames_per_s);
   ImGui::TextUnformatted(text.c_str());
   nameWidget("movie of " + text);

@@ -25,8 +25,9 @@ struct FolderEntry {
 /// Whether a folder is a grid's, to be opened as a file is.
 using IsGridFolder = std::function<bool(const std::filesystem::path& folder)>;
 
-/// Folders first, by name, without those that begin with a dot; files with one of the endings, compressed ones, too, or all
-/// if there are none; files without an ending or with a number for one in any case. Throws Error if the folder cannot be read.
+/// Folders first, by name, without those that begin with a dot; files with one of the endings, or all
+/// if there are none. Where .splats is one of them, data is chosen: caches and grids' folders, compressed files, and those without
+/// an ending or with a number for one, too. Throws Error if the folder cannot be read.
 std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
                                    const std::vector<std::string>& endings,
                                    const IsGridFolder& is_grid_folder);
