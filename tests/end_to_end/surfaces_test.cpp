@@ -293,6 +293,22 @@ TEST_F(SurfaceOptions, LinesAreTheSameFromEveryFormat) {
   expectSays(damaged("NumberOfLines=\"2\"", ""), "has no lines; --points draws the points of a file");
 }
 
+TEST_F(SurfaceOptions, ALineFromBehindTheViewerIsDrawnAsFarAsItIsSeen) {
+  const auto drawn = [](const std::string& name, double begin) {
+    writeFileAtomically(file(name), fmt::format("x,y,z,s,id\n{0},2.5,1,{0},1\n5,2.5,1,5,1\n"
+                                                "50,90,90,5,2\n50,91,90,-100,2\n",
+                                                begin));
+    run({"render", file("wake.splats"), "-o", file("a.pfm"), "--size", "100x100", "--volume", "off",
+         "--lines", file(name), "--lines-by", "s", "--line-width", "6px", "--position=-2,2.5,2.5",
+         "--focal-point", "5,2.5,1.5", "--view-angle", "60"});
+    return readImage(file("a.pfm"));
+  };
+  // Both are the same line where it is in sight, with the same colours.
+  const Image near = drawn("near.csv", -1.5), far = drawn("far.csv", -100);
+  EXPECT_GT(compareImages(near, far).psnr_db, 60);
+  EXPECT_LT(compareImages(near, Image(near.size)).psnr_db, 40);
+}
+
 TEST_F(SurfaceOptions, AreDrawnThoughSplatsAreLargerThanSinglePrecision) {
   for (const Words& look : {Words{"--zoom", "1e25"}, Words{"--parallel-scale", "1e-30"}})
     for (const Words& what :
