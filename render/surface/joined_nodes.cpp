@@ -188,13 +188,13 @@ class Joiner {
   /// The maps with the most votes, and those that lay whole faces on one another: where cells are thin and grid lines bend, the
   /// nearest node is not the one that is meant.
   std::vector<FaceMap> mapsFor(const BlockFace& face, const std::map<FaceMap, size_t>& votes) const {
-    constexpr size_t kMostVoted = 4;
+    constexpr size_t kMaxVoted = 4;
     std::vector<std::pair<FaceMap, size_t>> sorted(votes.begin(), votes.end());
     std::stable_sort(sorted.begin(), sorted.end(),
                      [](const auto& a, const auto& b) { return a.second > b.second; });
     std::vector<FaceMap> maps;
     std::set<BlockFace> onto{face, {face.block, face.axis, !face.at_end}};
-    for (size_t n = 0; n < std::min(sorted.size(), kMostVoted); ++n) {
+    for (size_t n = 0; n < std::min(sorted.size(), kMaxVoted); ++n) {
       maps.push_back(sorted[n].first);
       onto.insert(sorted[n].first.to);
     }
