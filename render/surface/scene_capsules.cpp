@@ -32,7 +32,7 @@ Capsule guarded(const Capsule& capsule, float guard) {
       if (of_b < 0) to = std::min(to, of_a / (of_a - of_b));
     }
   if (!(from <= to)) return none;
-  const auto at = [&](float part) {
+  const auto at = [a = a, b = b](float part) {
     return ScreenVertex{std::lerp(a.x, b.x, part), std::lerp(a.y, b.y, part),
                         std::lerp(a.value, b.value, part)};
   };

@@ -56,18 +56,18 @@ bool SceneTriangles::isOpaque(size_t surface) const {
 }
 
 /// Affine in the positions, and the perspective divide.
-void SceneTriangles::projectAll(const glm::dvec3& of_positions, const std::vector<glm::vec3>& positions,
+void SceneTriangles::projectAll(const glm::dvec3& origin, const std::vector<glm::vec3>& positions,
                                 std::vector<ScreenVertex>& out) const {
   const bool perspective = view_.projection == Projection::kPerspective;
-  const glm::dvec3 origin = view_.viewFromData(of_positions);
+  const glm::dvec3 first = view_.viewFromData(origin);
   const glm::dvec3 right = view_.right * view_.scale, down = view_.down * view_.scale,
                    forward = view_.forward * view_.scale;
   tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kVerticesAtOnce), [&](const auto& range) {
     const auto inView = [&](size_t n) {
       const double x = positions[n].x, y = positions[n].y, z = positions[n].z;
-      return glm::dvec3(origin.x + (right.x * x + right.y * y + right.z * z),
-                        origin.y + (down.x * x + down.y * y + down.z * z),
-                        origin.z + (forward.x * x + forward.y * y + forward.z * z));
+      return glm::dvec3(first.x + (right.x * x + right.y * y + right.z * z),
+                        first.y + (down.x * x + down.y * y + down.z * z),
+                        first.z + (forward.x * x + forward.y * y + forward.z * z));
     };
     if (perspective) {
       for (size_t n = range.begin(); n < range.end(); ++n) out[n] = project(inView(n));

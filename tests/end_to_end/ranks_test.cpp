@@ -88,8 +88,9 @@ TEST_F(RanksCommand, ReportADamagedStepOfASeriesOnce) {
     const std::string name = file(fmt::format("s_{:04}.fun", damaged));
     const auto size = fs::file_size(name);
     fs::resize_file(name, size - 7);
-    const ProgramResult result = runAsRanks(3, {"convert", file("s.xyz"), file("s_%04d.fun"), "-o",
-                                                file("s.splats"), "--overwrite", "--threads", "1"});
+    const ProgramResult result =
+        runAsRanks(3, {"convert", file("s.xyz"), file("s_%04d.fun"), "-o", file("s.splats"), "--overwrite",
+                       "--threads", "1", "--refine", "1"});
     fs::resize_file(name, size);
     expectRefused(result, 1, {"rank 0 of 3", fmt::format("s_{:04}.fun", damaged)});
   }
@@ -104,18 +105,19 @@ TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
     fs::copy_file(file(name), file("other/") + name);
   fs::resize_file(file("other/s_0003.fun"), 100);
   const std::string script = file("one_old.sh");
-  writeFileAtomically(script,
-                      fmt::format("#!/bin/sh\n"
-                                  "cd \"{}\"\n"
-                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && cd other\n"
-                                  "exec \"{}\" convert s.xyz s_%04d.fun --threads 1 --overwrite -o \"{}\"\n",
-                                  file(""), CURVISPLAT_PROGRAM, file("s.splats")));
+  writeFileAtomically(
+      script,
+      fmt::format("#!/bin/sh\n"
+                  "cd \"{}\"\n"
+                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && cd other\n"
+                  "exec \"{}\" convert s.xyz s_%04d.fun --threads 1 --refine 1 --overwrite -o \"{}\"\n",
+                  file(""), CURVISPLAT_PROGRAM, file("s.splats")));
   fs::permissions(script, fs::perms::owner_all);
   const ProgramResult result = runAsRanks(3, {}, script);
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
   expectSays(result.err, "warning: rank 1 could not convert step 3 (s_0003.fun)");
-  run({"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1", "--overwrite", "-o",
+  run({"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1", "--refine", "1", "--overwrite", "-o",
        file("alone.splats")});
   for (const auto& [name, bytes] : filesOf(file("alone.splats")))
     if (name != "manifest.json") {

@@ -94,6 +94,8 @@ def differing_from(tab, file, by=0):
 
 def copies_the_command(tab, caches, edited):
     """The command that the page shows draws its picture, in the folder of the cache; an edited function is in a file."""
+    # The grid's lines that lie behind the data are in the command's picture alone.
+    tab.run("state.axes_grid = false; showState(); changed()")
     if edited:
         before = rest(tab)
         tab.run("setPoints([[0, 0.2], [0.3, 0.9], [1, 0.1]].map(([u, opacity]) => ({ u, opacity, midpoint: 0.25, sharpness: 0.5 }))); changed()")
@@ -111,7 +113,8 @@ def copies_the_command(tab, caches, edited):
         (pathlib.Path(caches[0]).parent / name).write_text(content)
     tab.run("document.getElementById('copied').close()")
     expect("/" not in text.split()[2], f"the command names no folder of the server: {text}")
-    expect(len(files) == (1 if edited else 0), f"files of functions: {files}")
+    if edited:
+        expect(len(files) == 1, f"files of functions: {files}")
     words = shlex.split(text)
     expect(words[:2] == ["curvisplat", "render"], text)
     subprocess.run([program, *words[1:]], cwd=pathlib.Path(caches[0]).parent, check=True, capture_output=True)

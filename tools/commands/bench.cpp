@@ -92,13 +92,7 @@ void printMachine(const Machine& machine) {
   fmt::print("{} cores ({}), {:.1f} GiB of memory, {}, {}\n", machine.cores,
              machine.processor.empty() ? "processor unknown" : machine.processor,
              static_cast<double>(machine.memory_bytes) / (1 << 30), machine.system, machine.file_system);
-}
-
-/// Describes the machine before anything is measured.
-Machine describedMachine(const fs::path& folder) {
-  Machine machine = Machine::here(folder);
-  if (const std::string note = machine.busyNote(); !note.empty()) printMessage("note: {}", note);
-  return machine;
+  if (const std::string note = machine.busyNote(); !note.empty()) printLine("{}", note);
 }
 
 void printSection(const std::string& head, const std::string& text) {
@@ -221,7 +215,7 @@ void benchCache(const BenchArguments& arguments) {
   };
   const ThroughputScene scene{cache, variable, function, options, backend, orbit};
   const std::string backend_name = FrameRenderer(cache, variable, function, backend).backendName();
-  const Machine machine = describedMachine(cache.path());
+  const Machine machine = Machine::here(cache.path());
   const Effort effort = arguments.quick ? kQuick : Effort{};
 
   printLine("{}: {} samples as {} splats in {} bricks; scalar {}", arguments.cache.string(), manifest.nodes,
@@ -295,7 +289,7 @@ void benchConversion(const BenchArguments& arguments) {
   if (!fs::is_directory(effort.temporary_folder, ignored))
     throw Error("--tmp {}: no such directory", effort.temporary_folder.string());
 
-  const Machine machine = describedMachine(effort.temporary_folder);
+  const Machine machine = Machine::here(effort.temporary_folder);
   Measurements measurements;
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);

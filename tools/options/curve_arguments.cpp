@@ -205,7 +205,7 @@ void checkCurveArguments(const CurveArguments& arguments) {
   if (!arguments.colours.empty()) throw UsageError("--lines-colour needs lines or points: --lines FILE");
   if (!arguments.by.empty()) throw UsageError("--lines-by needs lines or points: --lines FILE");
   if (arguments.time) throw UsageError("--lines-time needs lines or points: --lines FILE");
-  if (arguments.opacity != otherwise.opacity)
+  if (parseCurveOpacity(arguments.opacity) != parseCurveOpacity(otherwise.opacity))
     throw UsageError("--lines-opacity needs lines or points: --lines FILE");
 }
 

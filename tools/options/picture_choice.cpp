@@ -273,11 +273,12 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
 
 namespace {
 
-/// The place behind that of the camera from which the box is seen whole at all angles of an orbit.
-glm::dvec3 placeForOrbit(const Camera& camera, double degrees, const PictureChoice::Framing& framing) {
+/// The place behind that of the camera from which the box is seen whole once around, so that a part of an orbit has the pictures of
+/// the whole one.
+glm::dvec3 placeForOrbit(const Camera& camera, const PictureChoice::Framing& framing) {
   double distance = 0;
   for (unsigned n = 0; n < kDefaultFrames; ++n) {
-    Camera turned = orbited(camera, std::clamp(degrees, -360.0, 360.0) * n / kDefaultFrames);
+    Camera turned = orbited(camera, 360.0 * n / kDefaultFrames);
     turned.fit(framing.box.lower, framing.box.upper, framing.size);
     distance = std::max(distance, glm::distance(turned.position, turned.focal_point));
   }
@@ -302,7 +303,7 @@ CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferF
     add(option, value);
   };
   Camera camera = cameraOf(choice, box.lower, box.upper, size);
-  if (orbits) camera.position = placeForOrbit(camera, parseNumber("--orbit", *arguments.orbit), framing);
+  if (orbits) camera.position = placeForOrbit(camera, framing);
   say("--position", arguments.position, exactPoint(camera.position));
   if (camera.view_up != glm::dvec3(0, 0, 1)) say("--view-up", arguments.view_up, exactPoint(camera.view_up));
   if (choice.focal_point) say("--focal-point", arguments.focal_point, exactPoint(*choice.focal_point));
