@@ -154,7 +154,10 @@ TEST_F(IsoMeshesTest, AClosedBlockHasNoSeam) {
     ASSERT_GT(mesh->triangles.size(), 1000u);
     EXPECT_EQ(openEdges(*mesh), 0u) << inner << ' ' << layer;
     for (uint32_t n = 0; n < mesh->positions.size(); ++n)
-      EXPECT_NEAR(distance(corner(*mesh, n)), 0.3, inner > 1 || layer < 0.1 ? 0.05 : 0.02)
+      EXPECT_NEAR(distance(corner(*mesh, n)), 0.3,
+                  layer < 0.1 ? 0.08
+                  : inner > 1 ? 0.05
+                              : 0.02)
           << inner << ' ' << layer;
   }
 }
