@@ -64,45 +64,6 @@ TEST_F(WindowStart, TheDialogOpensAZarrStore) {
   close();
 }
 
-/// The grid alone is not enough; with its solution what was said goes away.
-TEST_F(WindowStart, ALoneGridAsksForItsSolution) {
-  fs::remove_all("both");
-  fs::create_directory("both");
-  for (const char* name : {"a.xyz", "a.fun"}) fs::copy_file(name, fs::path("both") / name);
-  std::ofstream("both/notes.txt") << "no grid";
-  openEmpty();
-  click("open");
-  answer("both/a.xyz");
-  const auto says = [] { return hasWidget("message a.xyz: has no values"); };
-  EXPECT_TRUE(eventually(says, 60));
-  click("open");
-  placeOf("file name");
-  press("ctrl+a");
-  act({"type", "both"});
-  press("Return");  // enters the folder: the dialog stays
-  EXPECT_TRUE(eventually([] { return hasWidget("file a.xyz"); }));
-  EXPECT_FALSE(hasWidget("file notes.txt"));
-  click("all files");
-  placeOf("file notes.txt");
-  click("all files");
-  EXPECT_TRUE(eventually([] { return !hasWidget("file notes.txt"); }));
-  click("file a.xyz");
-  act({"keydown", "ctrl"});
-  click("file a.fun");
-  act({"keyup", "ctrl"});
-  click("file accept");
-  placeOf("scalar shown: f");
-  EXPECT_TRUE(eventually([&] { return !says(); }));
-  close();
-  // The folder is remembered.
-  openEmpty();
-  click("open");
-  placeOf("file a.xyz");
-  press("Escape");  // the dialog has the keys
-  EXPECT_TRUE(eventually([] { return !hasWidget("file name"); }));
-  close();
-}
-
 TEST_F(WindowStart, AnExampleIsShownWithoutAFile) {
   openEmpty();
   click("example");

@@ -108,14 +108,7 @@ ConversionServices conversionServices(ValuePrecision precision) {
     kept.preview = [&](const KeptPreview& preview) {
       events.preview({preview.cache, preview.whole, whatOf(preview), preview.folder});
     };
-    try {
-      return keptCacheOf(files, progress, kept, {}, precision);
-    } catch (const LoneGrid&) {
-      if (files.size() > 1) throw;
-      throw Error(
-          "{}: has no values, only coordinates: choose the solution, too (Ctrl + click takes several files)",
-          files.front().filename().string());
-    }
+    return keptCacheOf(files, progress, kept, {}, precision);
   };
   services.sources_of = sourcesOf;
   services.further_scalars = [](const std::filesystem::path& cache, const Paths& files) {

@@ -289,11 +289,11 @@ std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
 std::vector<uint32_t> scalarsNamed(const GridDescription& description,
                                    const std::vector<std::string>& names) {
   if (description.scalars.empty())
-    throw LoneGrid("the files contain no scalar{}", sourceOfScalars(description));
+    throw UsageError("the files contain no scalar{}", sourceOfScalars(description));
   if (names.empty()) {
     if (description.scalars.front().derived)
-      throw LoneGrid("the files contain no scalar; choose a derived one with --scalar; {}",
-                     namesIn(description));
+      throw UsageError("the files contain no scalar; choose a derived one with --scalar; {}",
+                       namesIn(description));
     return {0};
   }
   std::vector<uint32_t> positions;

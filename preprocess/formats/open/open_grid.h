@@ -11,7 +11,6 @@
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/grid/grid_source.h"
-#include "stream/base/error.h"
 
 namespace curvisplat {
 
@@ -29,14 +28,8 @@ std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
 /// ("cannot be added to a cache").
 std::unique_ptr<GridSource> requireGrid(std::unique_ptr<DataSource> source, const char* cannot);
 
-/// The files hold a grid alone, and no scalar was asked for that can be computed from it.
-class LoneGrid : public UsageError {
- public:
-  using UsageError::UsageError;
-};
-
 /// Indices into description.scalars for `names`; each is a name, the number of a function file's variable,
-/// or a PLOT3D function number. Without names: the first scalar; LoneGrid if the files hold none, named or not. Throws UsageError
+/// or a PLOT3D function number. Without names: the first scalar, if the files hold any. Throws UsageError
 /// that lists the available names.
 std::vector<uint32_t> scalarsNamed(const GridDescription& description, const std::vector<std::string>& names);
 
