@@ -108,8 +108,7 @@ class StepLog {
     if (event.source && event.converted)
       for (const auto* warnings : {&event.source->warnings, &event.converted->warnings})
         for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
-    if (event.source && event.converted && cuts_by_need_)
-      if (const std::string note = noteOnCuts(*event.source); !note.empty()) printMessage("note: {}", note);
+    if (event.source && event.converted && cuts_by_need_) note_ = noteOnCuts(*event.source);
     if (event.source && event.converted && last_)
       if (const std::string note = noteOnLaterScalars(*event.source, *last_); !note.empty())
         printMessage("warning: {}", note);
@@ -123,12 +122,18 @@ class StepLog {
     bytes_ += totalBytes(files);
   }
 
+  /// Says once what was done to the cells, after the work: an error is one line.
+  void sayNote() {
+    if (!note_.empty()) printMessage("note: {}", note_);
+    note_.clear();
+  }
   uint64_t bytes() const { return bytes_; }
   const nlohmann::json& steps() const { return steps_; }
 
  private:
   Progress& progress_;
   bool cuts_by_need_;  // without being asked to
+  std::string note_;
   std::optional<OpenGridOptions> last_;
   nlohmann::json steps_ = nlohmann::json::array();
   uint64_t bytes_ = 0;
@@ -164,6 +169,7 @@ void follow(const ConvertArguments& arguments) {
       const std::vector<StepFiles> only{one};
       const SeriesReport report = convertSeries(seriesInput(arguments, only), options, progress,
                                                 [&](const SeriesEvent& event) { log.add(event); });
+      log.sayNote();
       if (report.converted > 0) printLine("step {}: {}", report.steps - 1, one.name);
       std::fflush(stdout);
       steps = report.steps;
@@ -236,6 +242,7 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
     }
   }();
   writePartRecord(folder, part, steps.size(), report.origins);
+  log.sayNote();
   printSums(report, options.convert.output);
   writeSeriesStatistics(arguments, report, log, progress);
 }
@@ -299,6 +306,7 @@ void runConvertSeries(ConvertArguments arguments) {
   const SeriesReport report =
       convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
   if (!ranks.isFirst()) return;
+  log.sayNote();
 
   const double seconds = secondsOf(progress);
   const auto samples = static_cast<double>(report.nodes * report.converted);
