@@ -17,7 +17,7 @@ double luminance(const std::array<double, 3>& rgb) {
 }
 
 double contrast(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  const auto [darker, lighter] = std::minmax(luminance(a), luminance(b));
+  const auto [darker, lighter] = std::minmax({luminance(a), luminance(b)});
   return (lighter + 0.05) / (darker + 0.05);
 }
 
