@@ -58,8 +58,8 @@ double changeBetween(const CellStep& before, const CellStep& after) {
   return std::copysign(std::min(0.5 * std::abs(after.change - before.change), most), after.difference);
 }
 
-/// The same at a border, by the step away from it and the further difference, to the second cell: none unless both have one
-/// sign; and along the axis no part of the cell has another sign than `value`.
+/// How much the value of a cell at a border changes, by the step away from the border and the further difference, to the second
+/// cell: not at all unless both have one sign; and along the axis no part of the cell has another sign than `value`.
 double changeAtBorder(double value, const CellStep& step, double further) {
   if (!(step.difference * further > 0)) return 0;
   return std::copysign(std::min({std::abs(step.change), 2 * std::abs(further), 2 * std::abs(value)}),

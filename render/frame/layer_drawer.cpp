@@ -73,7 +73,7 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
              kTriangleBytes * surface.mesh->triangles.size();
   for (const Curves& curves : options.scene->curves) bytes += kPointBytes * curves.set->positions.size();
-  // In the grid's cells or in the field of splats, one after the other.
+  // Isosurfaces are of the grid's cells or of the field of splats, never of both at once.
   if (!options.scene->isovalues.empty())
     bytes += std::max(
         IsoMeshes::bytes(cache_.manifest(), coloured_by_.has_value(), options.scene->isovalues.size()),

@@ -220,7 +220,7 @@ float FileDialog::heightBelow() const {
   return lines * ImGui::GetFrameHeightWithSpacing();
 }
 
-/// Draws the dialog's keys in the place of the files.
+/// Draws the list of the dialog's keys where the files are otherwise.
 void FileDialog::drawHelp(bool saves) const {
   ImGui::BeginChild("entries", {0, -heightBelow()}, true);
   nameArea("dialog keys", 0, 0, 1, 1);

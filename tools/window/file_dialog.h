@@ -68,7 +68,7 @@ class FileDialog {
   /// The same, to save a movie.
   void openToSaveMovie(const std::string& name, MovieOffer offer);
   bool isOpen() const { return purpose_.has_value(); }
-  /// Shows the dialog's keys in the place of the files, or the files again.
+  /// Shows the list of the dialog's keys instead of the files, or the files again.
   void toggleHelp() { help_ = !help_; }
   const std::filesystem::path& dataFolder() const { return data_folder_; }
   /// Draws it, if it is open. Returns what was chosen, once.
