@@ -117,7 +117,7 @@ TEST_F(BackgroundJobTest, SaysHowFarItIs) {
   BackgroundJob job(
       "saving a.mp4", "beginning",
       [&](Progress& progress) {
-        progress.begin("drawing", 4, "frames");
+        progress.begin("sorting splats", 4, "splats");
         progress.advance(1);
         looked.wait();
         progress.end();
@@ -125,7 +125,7 @@ TEST_F(BackgroundJobTest, SaysHowFarItIs) {
       },
       nobody);
   EXPECT_EQ(job.title(), "saving a.mp4");
-  EXPECT_TRUE(eventually([&] { return job.phase() == "drawing"; }));
+  EXPECT_TRUE(eventually([&] { return job.phase() == "sorting splats"; }));
   EXPECT_GE(job.part(), 0);
   EXPECT_LE(job.part(), 0.25f);
   looked.count_down();

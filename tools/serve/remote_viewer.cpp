@@ -74,12 +74,12 @@ class RemoteViewer::Work {
     for (const uint64_t picture : inbox.shown) line_.shown(picture, clockSeconds());
     if (inbox.open) answer([&] { return caches_.cacheText(*inbox.open); });
     if (inbox.view) wanted_ = std::move(inbox.view);
+    woken_ |= inbox.woken;
+    advance();
     if (inbox.pick && frames_ && !asked_.empty() && !(inbox.pick->hovers && picked_ && !picked_->hovers)) {
       picked_ = inbox.pick;
       if (!values_) frames_->requestValues();
     }
-    woken_ |= inbox.woken;
-    advance();
     if (picked_ && frames_) answer([&] { return pickedText(); });
     // These may take some tenths of a second: behind the picture.
     if (inbox.function) answer([&] { return caches_.functionText(*inbox.function); });
@@ -328,7 +328,10 @@ void RemoteViewer::receive(ClientMessage message) {
   {
     const MutexLock lock(mutex_);
     if (auto* const open = std::get_if<OpenRequest>(&message)) inbox_.open = *open;
-    if (auto* const view = std::get_if<ViewRequest>(&message)) inbox_.view = std::move(*view);
+    if (auto* const view = std::get_if<ViewRequest>(&message)) {
+      inbox_.view = std::move(*view);
+      inbox_.pick.reset();  // it was of another picture
+    }
     if (auto* const function = std::get_if<FunctionRequest>(&message)) inbox_.function = std::move(*function);
     if (auto* const one = std::get_if<HistogramRequest>(&message)) inbox_.histogram = std::move(*one);
     if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
