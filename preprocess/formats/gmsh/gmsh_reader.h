@@ -69,11 +69,12 @@ class GmshReader {
   Stored next() {
     if (!binary_) {
       const double number = text_.number();
-      if constexpr (std::is_integral_v<Stored>)
-        if (!(number >=
-                  static_cast<double>(std::is_signed_v<Stored> ? std::numeric_limits<Stored>::min() : 0) &&
-              number <= 0x1p53))
+      if constexpr (std::is_integral_v<Stored>) {
+        using Limits = std::numeric_limits<Stored>;
+        if (!(number >= static_cast<double>(Limits::min()) &&
+              number <= std::min(static_cast<double>(Limits::max()), 0x1p53)))
           fail(fmt::format("has {} as a number of something", number));
+      }
       return static_cast<Stored>(number);
     }
     if (bytes_at_ == 0) {
