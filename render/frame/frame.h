@@ -2,11 +2,11 @@
 //
 //   plan -> read -> prepare -> sweep -> draw -> image
 //    |               |          |        painter
-//    the cut,        workers:   one order of all splats
-//    its parts       decode,
-//    by depth        project
+//    the cut,        workers:   splats by their   puts them into the
+//    its parts       decode,    first depth in    order of each tile
+//    by depth        project    any tile
 //
-// Workers prepare bricks in any order; splats are drawn in the order of their depth. The number of splats
+// Workers prepare bricks in any order; a tile's splats are drawn in the order of their depth there. The number of splats
 // that are prepared but not yet drawn is bounded. The same cache, view and options give the same image bit
 // for bit, for any number of threads and any memory, and whatever was drawn before.
 //

@@ -29,8 +29,7 @@ struct KeyRange {
   uint32_t first = 0, last = 0;
 };
 
-/// Keys that increase in drawing order: front to back they increase with the depth; back to front they are
-/// the complements of those keys.
+/// Keys that increase with the depth.
 ///
 /// A splat has a key at its centre, and how that changes over the screen (tile_key.h). The sweep takes it by
 /// the first key that it has in any tile; if that lies before the keys of its brick, by the first of those.
@@ -76,8 +75,8 @@ struct DepthItem {
 /// Sorts splats by their depth keys. Keeps its memory between calls: 16 bytes per item.
 class DepthSorter {
  public:
-  /// Sorts splats 0 .. keys.size() - 1 by their keys. Splats with equal keys are sorted by their numbers,
-  /// ascending if `order` is front to back and descending if it is back to front. Valid until the next call.
+  /// Sorts splats 0 .. keys.size() - 1 by their keys, those with equal keys by their numbers. Valid until the
+  /// next call.
   std::span<const DepthItem> sort(std::span<const uint32_t> keys);
 
   /// Space for `count` items, which the caller fills before sort().

@@ -1,5 +1,6 @@
-// Brings the splats of all bricks of a frame into one order by a sweep along the depth. No more than a layer
-// of them is in memory: those that a later brick may still precede.
+// Brings the splats of all bricks of a frame into the order of the first key that each has in any tile, by a
+// sweep along the depth; tiles then order what leans by their own keys (render/tiles). No more than a layer of
+// them is in memory: those that a later brick may still precede.
 //
 //   parts, by their nearest key      |---a---|
 //                                      |-----b-----|
@@ -7,9 +8,8 @@
 //                                                |----d----|
 //   a, b, c are in:    what lies before here ----^ is final: it is sorted and drawn
 //
-// "Nearest" and "before" refer to the drawing order, which may also be back to front. Splats are ordered by
-// key, then by brick, then by their number in the brick (SweepPosition): no two are equal, and the order
-// depends only on the cache and the view.
+// Splats are ordered by key, then by brick, then by their number in the brick (SweepPosition): no two are
+// equal, and the order depends only on the cache and the view.
 //
 // A worker enters each part as a sorted run when it is that part's turn. Splats whose order is final leave
 // in batches, which workers sort and pass on. If a layer is larger than the buffer, the sweep is made in

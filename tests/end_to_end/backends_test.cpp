@@ -38,7 +38,8 @@ INSTANTIATE_TEST_SUITE_P(, EveryScene,
                                          BackendScene{"half-annulus", {"--clustering", "9"}},
                                          BackendScene{"half-annulus-constant", {}}, BackendScene{"shell", {}},
                                          BackendScene{"o-grid", {}}, BackendScene{"axis", {}},
-                                         BackendScene{"sheared-waves", {}}, BackendScene{"wake", {}}));
+                                         BackendScene{"sheared-waves", {}}, BackendScene{"wake", {}},
+                                         BackendScene{"ocean", {}}, BackendScene{"boundary-layer", {}}));
 
 TEST_P(EveryScene, IsTheSameByOpenGlAndByTheProcessor) {
   run(Words{"generate", GetParam().scene, "--size", "32x20x20", "-o", file("a")} + GetParam().options);

@@ -1,11 +1,13 @@
 #include "tests/reference/global_order.h"
 
 #include <algorithm>
+#include <memory>
 #include <tuple>
 
 #include "render/frame/frame_plan.h"
 #include "render/project/footprint.h"
 #include "render/project/tile_key.h"
+#include "render/surface/scene_layers.h"
 #include "stream/paging/layer_merger.h"
 
 namespace curvisplat {
@@ -57,10 +59,18 @@ std::vector<Placed> inTile(const std::vector<Placed>& placed, int x, int y) {
 
 }  // namespace
 
-Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_function, Backend backend,
+Image globallySorted(const CacheReader& cache, const DrawnScalars& scalars, Backend backend,
                      const Camera& camera, const FrameOptions& options) {
-  const FramePlanner planner(cache, {0, transfer_function});
-  const FramePlan plan = planner.plan(camera, options);
+  const FramePlanner planner(cache, scalars);
+  FramePlan plan = planner.plan(camera, options);
+  if (options.scene) {
+    const glm::dvec3 middle = 0.5 * (cache.manifest().lower + cache.manifest().upper);
+    const ScreenView& view = plan.settings.view;
+    const double origin = view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
+    plan.layers = std::make_shared<PixelLayers>(layersOf(
+        *options.scene, view, {}, {planner.colours(), options.light, plan.settings.clip_planes, origin}));
+    plan.settings.layers = plan.layers.get();
+  }
   std::vector<Placed> placed;
   BrickProjector projector;
   std::vector<uint32_t> keys;
@@ -68,18 +78,22 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_
     const BrickPart& part = swept.part;
     const Brick& brick = cache.bricks()[part.brick];
     SplatGeometry geometry;
-    SplatVariable values;
+    SplatVariable values, colours;
     cache.readGeometry(part.brick, geometry);
-    cache.readVariable(part.brick, 0, values);
+    cache.readVariable(part.brick, scalars.opacity.variable, values);
+    if (scalars.colour) cache.readVariable(part.brick, scalars.colour->variable, colours);
     SplatRanges ranges(brick, part.octants);
     if (part.merging > 0) {
-      LayerMerger().merge(*plan.mergings[part.merging - 1u], brick.largest_radius, geometry, values, nullptr);
+      LayerMerger().merge(*plan.mergings[part.merging - 1u], brick.largest_radius, geometry, values,
+                          scalars.colour ? &colours : nullptr);
       Brick merged;
       merged.splats = static_cast<uint32_t>(geometry.size());
       ranges = {merged, kAllOctants};
     }
     const glm::dvec3 corner = cache.manifest().root.cellMin(brick.cell);
-    projector.project(plan.settings, planner.table(), corner, arraysOf(geometry), arraysOf(values),
+    BrickValues drawn(arraysOf(values));
+    if (scalars.colour) drawn.colours = arraysOf(colours);
+    projector.project(plan.settings, planner.table(), corner, arraysOf(geometry), drawn,
                       {ranges.begin(), ranges.end()});
     keys.resize(projector.depths().size());
     plan.keys.setKeys(projector.mutableSplats(), projector.depths(), corner, plan.keys.rangeOf(brick), keys);
@@ -94,7 +108,8 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_
   painting->run([&](Painter& painter) {
     const auto begin = [&] {
       painter.begin(options.size, options.background, planner.table(),
-                    {plan.settings.per_pixel, plan.settings.light.has_value()});
+                    {plan.settings.per_pixel, plan.settings.light.has_value(), plan.settings.layers,
+                     planner.colourClasses()});
     };
     if (one_order) {
       begin();

@@ -13,8 +13,14 @@
 
 namespace curvisplat {
 
-/// The picture that FrameRenderer::render() is to draw of the cache's first variable, bit for bit.
-Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_function, Backend backend,
+/// The picture that FrameRenderer::render() is to draw, bit for bit. A scene has surfaces alone; no part is left out
+/// behind them.
+Image globallySorted(const CacheReader& cache, const DrawnScalars& scalars, Backend backend,
                      const Camera& camera, const FrameOptions& options);
+/// The same of the cache's first variable.
+inline Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_function,
+                            Backend backend, const Camera& camera, const FrameOptions& options) {
+  return globallySorted(cache, DrawnScalars(0, transfer_function), backend, camera, options);
+}
 
 }  // namespace curvisplat

@@ -88,6 +88,27 @@ glm::dvec2 inFootprint(const ScreenSplat& splat, int x, int y) {
   return {u0, (y + 0.5 - splat.y - splat.l21 * u0) / splat.l22};
 }
 
+/// How much nearer than its middle a splat is seen, in half widths of its depths, and which part of their variance is
+/// seen: DESIGN.md, "What a splat hides of itself".
+struct NearSide {
+  double nearer = 0, variance = 1;
+
+  explicit NearSide(double tau) {
+    if (tau < 1e-3) return;  // the difference of large numbers
+    const double x = tau / 2;
+    nearer = 1 / std::tanh(x) - 1 / x;
+    variance = 3 * (1 / (x * x) - 1 / std::pow(std::sinh(x), 2));
+  }
+};
+
+/// The depth of a splat's cell along the ray: its amplitude without the low-pass.
+double cellDepth(const ScreenSplat& splat, double low_pass) {
+  const double l11 = splat.l11, l21 = splat.l21, l22 = splat.l22, whole = l11 * l22;
+  const double determinant =
+      (l11 * l11 - low_pass) * (l21 * l21 + l22 * l22 - low_pass) - std::pow(l11 * l21, 2);
+  return std::abs(splat.amplitude) * whole / std::sqrt(std::max(determinant, 1e-4 * whole * whole));
+}
+
 /// The share of one splat at a place of its footprint, premultiplied.
 glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, const glm::dvec2& at,
                         const ClassificationTable& table, PixelShading shading) {
@@ -98,18 +119,25 @@ glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, const glm::d
   if (depth == 0) return glm::dvec4(0.0);
   const float widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
   const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};
-  const auto meanOf = [&](const ClassificationTable& of, const ScreenColour& scalar) {
+  const auto meanOf = [&](const ClassificationTable& of, const ScreenColour& scalar, const NearSide& seen) {
     if (!shading.per_pixel) return of.mean(scalar.mean, 0);
     const double w = scalar.half_width, deviation = scalar.correlation * w / std::sqrt(3.0);
-    return of.mean(
-        scalar.mean + double{scalar.slope[0]} * u0 + double{scalar.slope[1]} * u1 + deviation * left.mean,
-        std::sqrt(std::max(0.0, w * w - 3 * deviation * deviation * (1 - left.variance))));
+    return of.mean(scalar.mean + double{scalar.slope[0]} * u0 + double{scalar.slope[1]} * u1 +
+                       deviation * left.mean - std::sqrt(3.0) * scalar.along * seen.nearer,
+                   std::sqrt(std::max(0.0, w * w - 3 * deviation * deviation * (1 - left.variance) -
+                                               3 * std::pow(scalar.along, 2) * (1 - seen.variance))));
   };
-  glm::dvec4 mean = meanOf(
-      table, {splat.mean, {splat.slope0, splat.slope1}, widest, static_cast<float>(cuts.correlation())});
+  const ScreenColour own{
+      splat.mean, {splat.slope0, splat.slope1}, widest, static_cast<float>(cuts.correlation()), splat.along};
+  glm::dvec4 mean = meanOf(table, own, NearSide(0));
   if (mean.w == 0) return glm::dvec4(0.0);
-  if (cuts.colour)
-    mean = glm::dvec4(mean.w * glm::dvec3(meanOf(*shading.colours, ScreenColour::of(*cuts.colour))), mean.w);
+  const NearSide seen(mean.w * cellDepth(splat, shading.low_pass_px2));
+  if (cuts.colour) {
+    const glm::dvec3 colour(meanOf(*shading.colours, ScreenColour::of(*cuts.colour), seen));
+    mean = glm::dvec4(mean.w * colour, mean.w);
+  } else if (const glm::dvec4 nearer = meanOf(table, own, seen); nearer.w > 0) {
+    mean = glm::dvec4(mean.w / nearer.w * glm::dvec3(nearer), mean.w);
+  }
   const double alpha = -std::expm1(-mean.w * depth);
   const glm::dvec3 colour = double{lit.diffuse} * glm::dvec3(mean) / mean.w + double{lit.specular};
   return glm::dvec4(colour, 1.0) * alpha;
@@ -257,6 +285,19 @@ std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed) {
   std::uniform_real_distribution<float> unit(0, 1);
   for (ScreenSplat& splat : splats)
     if (!isRecord(splat)) splat.half_width = packLit(splat.half_width, {unit(random), 0.5f * unit(random)});
+  return splats;
+}
+
+std::vector<ScreenSplat> hidingSome(std::vector<ScreenSplat> splats, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
+  for (size_t n = 0; n < splats.size(); ++n) {
+    ScreenSplat& splat = splats[n];
+    if (isRecord(splat) || n % 4 == 3) continue;
+    splat.amplitude *= 20 * unit(random);
+    splat.half_width += 0.1f;
+    splat.along = splat.half_width * around(random) / std::sqrt(3.0f);
+  }
   return splats;
 }
 

@@ -8,10 +8,13 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/scenes/scenes.h"
 #include "render/frame/frame.h"
+#include "render/mesh/triangle_mesh.h"
+#include "render/surface/surface_scene.h"
 #include "stream/base/error.h"
 #include "tests/reference/global_order.h"
 #include "tests/reference/known_pictures.h"
@@ -208,6 +211,50 @@ TEST_P(FrameOrderTest, IsThatOfOneSortWithClipPlanesAndLight) {
     }
   }
   EXPECT_GT(most_slabs, 1u);
+}
+
+/// A sheet through a cache's data, from corner to corner.
+std::shared_ptr<const SurfaceScene> sheetThrough(const CacheReader& cache, double opacity) {
+  const glm::dvec3 lower = cache.manifest().lower, extent = cache.manifest().upper - lower;
+  RawMesh sheet{{}, {{0, 1, 2}, {0, 2, 3}}};
+  for (const glm::dvec3& corner :
+       {glm::dvec3(0, 0, 0.1), glm::dvec3(1, 0, 0.4), glm::dvec3(1, 1, 1), glm::dvec3(0, 1, 0.6)})
+    sheet.positions.push_back(lower + corner * extent);
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->surfaces.emplace_back().mesh = std::make_shared<TriangleMesh>(meshOf(std::move(sheet)));
+  scene->surfaces.back().opacity.factor = opacity;
+  return scene;
+}
+
+// Layers of thin cells that lean, with a layer of the picture's pixels among them.
+TEST_P(FrameOrderTest, IsThatOfOneSortWithSurfacesAndTwoScalars) {
+  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
+  convertGrid(SceneGridSource(makeScene("boundary-layer"), {16, 40, 16}), *folder_ / "leaning.splats");
+  const CacheReader cache(*folder_ / "leaning.splats");
+  const VariableInfo& info = cache.manifest().variables[0];
+  const double diagonal = glm::length(cache.manifest().upper - cache.manifest().lower);
+  const DrawnScalars one(0, function(cache));
+  const DrawnScalars two({0, function(cache)},
+                         {0, TransferFunction::preset("viridis", info.min, info.max, diagonal)});
+  const Camera camera = looking(cache, glm::normalize(glm::dvec3(0.6, 0.64, 0.48)));
+  Image last;
+  for (const DrawnScalars& scalars : {one, two})
+    for (const double opacity : {0.5, 1.0}) {
+      FrameOptions wanted = options();
+      wanted.scene = sheetThrough(cache, opacity);
+      const Image expected = globallySorted(cache, scalars, GetParam(), camera, wanted);
+      EXPECT_NE(expected.rgba, last.rgba);
+      last = expected;
+      FrameRenderer renderer(cache, scalars, GetParam());
+      const uint64_t least = leastMemory(renderer, camera, wanted);
+      for (const auto& [memory, threads] : {std::pair{least, 5u}, std::pair{least + (40 << 20), 2u}}) {
+        wanted.memory_bytes = memory;
+        wanted.threads = threads;
+        FrameStatistics statistics;
+        EXPECT_EQ(renderer.render(camera, wanted, statistics).rgba, expected.rgba)
+            << opacity << ' ' << memory << ' ' << threads;
+      }
+    }
 }
 
 // Thin cells, 200 times as long as thick, of whose layers several lie in a pixel.

@@ -169,6 +169,26 @@ TEST_P(PainterTest, ColoursSplatsByAnotherScalarAsSpecified) {
             70);
 }
 
+TEST_P(PainterTest, ShowsNearerSidesAsSpecified) {
+  const ImageSize size{70, 50};
+  const PixelLayers layers = randomLayers(size, 3);
+  for (const bool layered : {true, false})
+    for (const bool light : {true, false}) {
+      auto splats = hidingSome(cutSome(randomSplats(200, 9, size, 0.05f), 4), 17);
+      if (light) splats = lit(splats, 11);
+      if (layered) splats = placeSome(splats, 5);
+      const PixelShading shading{true, light, layered ? &layers : nullptr};
+      const Image drawn = paint(splats, smooth(), shading, size, kWhite);
+      const Image specified = compositeSplats(splats, smooth(), shading, size, kWhite);
+      for (ScreenSplat& splat : splats) splat.along = 0;
+      const Image whole = compositeSplats(splats, smooth(), shading, size, kWhite);
+      // Painters leave out what moves a scalar by less than a 250th of the function, and take the extinction of the
+      // splat's middle (the processor).
+      EXPECT_GT(compareImages(drawn, specified).psnr_db, 55) << layered << ' ' << light;
+      EXPECT_LT(compareImages(drawn, whole).psnr_db, 45) << layered << ' ' << light;
+    }
+}
+
 TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
   const ImageSize size{90, 60};
   const PixelLayers layers = randomLayers(size, 3);
@@ -196,7 +216,7 @@ TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
 // A splat of optical depth tau with constant extinction is seen L(tau / 2) = coth(tau / 2) - 2 / tau half
 // widths of its depths before its middle: DESIGN.md, "What a splat hides of itself".
 TEST_P(PainterTest, ASplatShowsItsNearerSide) {
-  const ClassificationTable grey([](double f) { return TransferFunction::Value{glm::dvec3(f), 1}; }, 0, 1);
+  const ClassificationTable grey([](double f) { return TransferFunction::Value{{f, f * f, f}, 1}; }, 0, 1);
   for (const float along : {-0.15f, 0.1f})
     for (const float tau : {0.001f, 0.05f, 0.5f, 3.0f, 12.0f})
       for (const bool coloured : {false, true}) {
@@ -212,6 +232,12 @@ TEST_P(PainterTest, ASplatShowsItsNearerSide) {
         const double side = 1 / std::tanh(0.5 * tau) - 2 / tau;
         const double seen = 0.5 - std::sqrt(3.0) * along * side;
         EXPECT_NEAR(pixel[0] / pixel[3], seen, 4e-3) << along << ' ' << tau << ' ' << coloured;
+        // The part of the scalar's variance that goes with the depth shrinks as that of depths weighted by what is
+        // seen of them, e^-t from 0 to tau.
+        const double depths = std::pow(tau, -2.0) - 0.25 * std::pow(std::sinh(0.5 * double{tau}), -2.0);
+        const double variance = 0.03 - along * along * (1 - 12 * depths);
+        EXPECT_NEAR(pixel[1] / pixel[3], seen * seen + variance, 4e-3)
+            << along << ' ' << tau << ' ' << coloured;
       }
 }
 
