@@ -21,7 +21,7 @@ constexpr int32_t kFull = std::numeric_limits<int32_t>::max();
 constexpr uint64_t kLeafBytes = sizeof(Leaf) + Leaf::SIZE * sizeof(int32_t) + 64;
 constexpr uint64_t kSmallestTreeBytes = sizeof(Upper) + sizeof(Lower) + kLeafBytes;
 
-openvdb::Coord coordOf(const std::array<uint32_t, 3>& at) {
+openvdb::Coord voxelAt(const std::array<uint32_t, 3>& at) {
   return {static_cast<int32_t>(at[0]), static_cast<int32_t>(at[1]), static_cast<int32_t>(at[2])};
 }
 
@@ -81,7 +81,7 @@ void VdbCountingGrid::add(uint32_t level, std::span<const VoxelRun> runs) {
   CURVISPLAT_CHECK_OP(level, >=, level_);
   for (const VoxelRun& run : runs) {
     const auto shift = static_cast<int>(level - level_);
-    levels_[0]->add(coordOf(run.voxel) >> shift, run.count);
+    levels_[0]->add(voxelAt(run.voxel) >> shift, run.count);
     // When closed, the coarser levels stand beside the finest: together as large as it at most, but for the
     // least that a tree takes.
     while (2 * levels_[0]->bytes + level_ * kSmallestTreeBytes > memory_bytes_ && level_ > 0) coarsen();
@@ -121,7 +121,7 @@ uint64_t VdbCountingGrid::count(const Cell& cell) const {
   CURVISPLAT_CHECK_OP(cell.level, <=, level_);
   CURVISPLAT_CHECK_OP(levels_.size(), ==, level_ + 1);
   const SizedTree& tree = *levels_[level_ - cell.level];
-  return static_cast<uint64_t>(tree.tree.getValue(coordOf(cell.at)));
+  return static_cast<uint64_t>(tree.tree.getValue(voxelAt(cell.at)));
 }
 
 }  // namespace
