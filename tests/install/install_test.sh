@@ -13,6 +13,15 @@ prefix=$folder/prefix
 quietly() { "$@" > "$folder/log" 2>&1 || { cat "$folder/log"; echo "FAILED: $*"; exit 1; }; }
 expect() { "${@:2}" || { echo "FAILED: $1"; exit 1; }; }
 
+# README's way builds two targets alone: all that is installed of what a build makes comes with them.
+find "$build" -name cmake_install.cmake -exec grep -hoE "\"$build/[^\"]*\"" {} + | tr -d '"' | sed "s#^$build/##" | sort -u > "$folder/installed"
+ninja -C "$build" -t targets all | sed '/^ninja: /d; s/: [^:]*$//' | sort -u > "$folder/made"
+ninja -C "$build" -t inputs tools/curvisplat curvisplat_python | cat - <(echo tools/curvisplat) | sort -u > "$folder/with_both"
+comm -12 "$folder/installed" "$folder/made" > "$folder/needed"
+expect "what is installed is found" grep -qx 'tools/curvisplat-vdb.so' "$folder/needed"
+expect "the targets curvisplat and curvisplat_python make all that is installed: $(comm -23 "$folder/needed" "$folder/with_both")" \
+  test -z "$(comm -23 "$folder/needed" "$folder/with_both")"
+
 quietly cmake --install "$build" --prefix "$prefix"
 program=$prefix/bin/curvisplat
 expect "--version names the version" grep -qx "curvisplat [0-9.]*" <("$program" --version)
