@@ -286,7 +286,7 @@ Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptio
 }
 
 SweptPart sweptPart(const BrickPart& part, const Brick& brick, const DepthKeys& keys) {
-  return {part, part.brick, keys.rangeOf(brick)};
+  return {part, keys.rangeOf(brick)};
 }
 
 FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut) const {

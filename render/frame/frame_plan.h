@@ -66,7 +66,7 @@ struct FramePlan {
   BrickSource::Mergings mergings = {};                  // of the parts: BrickPart::merging
 };
 
-/// A part of the cut with its rank and its range of depth keys, as the sweep needs it.
+/// A part of the cut with its range of depth keys, as the sweep needs it.
 SweptPart sweptPart(const BrickPart& part, const Brick& brick, const DepthKeys& keys);
 
 /// The plan of a picture that must appear quickly.

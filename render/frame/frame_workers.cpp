@@ -207,7 +207,7 @@ bool FrameWorkers::enterReceived(Worker& worker, uint64_t sequence) {
   const auto received = work_->exchange->received(sequence);
   if (!received || isUnneeded(sequence)) return passOver(sequence);
   markSeen(number, Seen::kProjected);
-  return enter(worker, sequence, part.rank, {received->splats, received->keys});
+  return enter(worker, sequence, part.part.brick, {received->splats, received->keys});
 }
 
 /// Whether a part of this slab is hidden, or lies behind the slab's end.
@@ -284,7 +284,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
   }
   count(worker, seen_[number] == Seen::kProjected);
   markSeen(number, Seen::kProjected);
-  return enter(worker, sequence, part.rank, {worker.projector.splats(), worker.keys});
+  return enter(worker, sequence, part.part.brick, {worker.projector.splats(), worker.keys});
 }
 
 void FrameWorkers::project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys) {
@@ -331,7 +331,7 @@ bool FrameWorkers::passOver(uint64_t sequence) {
 }
 
 /// Enters a part's splats into the sweep.
-bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank, const Projected& projected) {
+bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t brick, const Projected& projected) {
   PrepareStatistics& statistics = worker.statistics;
   std::span<const DepthItem> sorted;
   {
@@ -344,13 +344,13 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank, const
     if (!sweep_.awaitTurn(sequence)) return false;
   }
   std::shared_ptr<SweepBuffer::Run> run;
-  while (!(run = sweep_.enter(rank, sorted))) {
+  while (!(run = sweep_.enter(brick, sorted))) {
     if (const auto batch = sweep_.nextFinal()) {
       if (!hand(worker, *batch)) return false;
       continue;
     }
     const WaitTimer timer(statistics.workers_waited_s, "wait for space");
-    if (!sweep_.awaitSpace(rank, sorted)) return false;
+    if (!sweep_.awaitSpace(brick, sorted)) return false;
   }
   const StageTimer timer(statistics.sort_s, "fill sweep");
   sweep_.fill(*run, sorted, projected.splats);

@@ -109,7 +109,7 @@ class FrameWorkers {
     std::span<const ScreenSplat> splats;
     std::span<const uint32_t> keys;
   };
-  bool enter(Worker& worker, uint64_t sequence, uint32_t rank, const Projected& projected);
+  bool enter(Worker& worker, uint64_t sequence, uint32_t brick, const Projected& projected);
   void project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys);
   bool hand(Worker& worker, const SweepBuffer::Batch& batch);
   std::optional<BrickSource::Splats> fetch(Worker& worker, uint64_t sequence, const BrickPart& part,

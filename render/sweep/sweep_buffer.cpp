@@ -22,11 +22,11 @@ size_t pagesFor(size_t splats) {
 }
 
 /// How many of a part's sorted splats lie before a position.
-size_t countBefore(const SweepPosition& mark, uint32_t rank, std::span<const DepthItem> sorted) {
+size_t countBefore(const SweepPosition& mark, uint32_t brick, std::span<const DepthItem> sorted) {
   size_t low = 0, high = sorted.size();
   while (low < high) {
     const size_t middle = (low + high) / 2;
-    if (SweepPosition{sorted[middle].key, rank, static_cast<uint32_t>(middle)} < mark)
+    if (SweepPosition{sorted[middle].key, brick, static_cast<uint32_t>(middle)} < mark)
       low = middle + 1;
     else
       high = middle;
@@ -125,19 +125,19 @@ void SweepBuffer::endTurn() {
   changed_.notify_all();
 }
 
-std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<const DepthItem> sorted) {
+std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t brick, std::span<const DepthItem> sorted) {
   const MutexLock lock(mutex_);
   if (closed_) return {};
   const TraceScope trace("enter sweep");
-  const size_t before = countBefore(begin_, rank, sorted);
-  const size_t before_end = std::max(before, countBefore(end_, rank, sorted));
+  const size_t before = countBefore(begin_, brick, sorted);
+  const size_t before_end = std::max(before, countBefore(end_, brick, sorted));
   size_t after = sorted.size();
   if (pagesFor(after - before) > free_.size()) after = before_end;
   const size_t needed = pagesFor(after - before);
   if (needed > free_.size()) return {};
   auto run = std::make_shared<Run>();
   run->part = parts_[turn_];
-  run->rank = rank;
+  run->brick = brick;
   run->before = static_cast<uint32_t>(before);
   run->count = after - before;
   entered_whole_[run->part] = after == sorted.size();
@@ -149,8 +149,8 @@ std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<co
   for (size_t n = 0; n < run->count; ++n) keys_[run->slot(n)] = sorted[before + n].key;
   if (run->count > 0) {
     const auto place =
-        std::upper_bound(live_.begin(), live_.end(), rank,
-                         [](uint32_t of_new, const auto& other) { return of_new < other->rank; });
+        std::upper_bound(live_.begin(), live_.end(), brick,
+                         [](uint32_t of_new, const auto& other) { return of_new < other->brick; });
     live_.insert(place, run);
   }
   ++filling_;
@@ -160,11 +160,11 @@ std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<co
   return run;
 }
 
-bool SweepBuffer::awaitSpace(uint32_t rank, std::span<const DepthItem> sorted) {
+bool SweepBuffer::awaitSpace(uint32_t brick, std::span<const DepthItem> sorted) {
   MutexLock lock(mutex_);
   if (!closed_ && isQuiet()) {
     // Splats may have become final meanwhile: then a batch can leave, and no space need be made.
-    if (splits_.empty() && countFinals() == 0) makeSpace(rank, sorted);
+    if (splits_.empty() && countFinals() == 0) makeSpace(brick, sorted);
   } else {
     const size_t before = free_.size();
     while (!closed_ && free_.size() <= before && !isQuiet()) changed_.wait(lock);
@@ -209,7 +209,7 @@ std::optional<SweepBuffer::Batch> SweepBuffer::nextFinal() {
 }
 
 SweepPosition SweepBuffer::position(const Run& run, size_t n) const {
-  return {keys_[run.slot(n)], run.rank, run.before + static_cast<uint32_t>(n)};
+  return {keys_[run.slot(n)], run.brick, run.before + static_cast<uint32_t>(n)};
 }
 
 /// Searches from the run's first splat on with growing steps: fast if the mark is close to it.
@@ -290,21 +290,21 @@ void SweepBuffer::splitFinals(size_t finals, bool last_may_stay) {
 
 /// Makes space for those splats of the part to be entered that lie before the slab's end. Requires that
 /// nothing in the buffer is final: all splats are in live runs, and no batch is being sorted.
-void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
-  if (end_ == kSweepEnd) end_ = behindKey(pageStart(kFirstEighths, rank, sorted));
+void SweepBuffer::makeSpace(uint32_t brick, std::span<const DepthItem> sorted) {
+  if (end_ == kSweepEnd) end_ = behindKey(pageStart(kFirstEighths, brick, sorted));
   std::vector<std::pair<size_t, Run*>> behind;  // splats
   for (const auto& run : live_)
     if (const size_t count = run->count - firstNotBefore(*run, end_); count > 0)
       behind.emplace_back(count, run.get());
   std::sort(behind.begin(), behind.end(), [](const auto& a, const auto& b) {
-    return a.first != b.first ? a.first > b.first : a.second->rank < b.second->rank;
+    return a.first != b.first ? a.first > b.first : a.second->brick < b.second->brick;
   });
   for (const auto& [count, run] : behind) {
-    if (free_.size() >= pagesNeeded(rank, sorted) + pages() / kSpareShare) break;
+    if (free_.size() >= pagesNeeded(brick, sorted) + pages() / kSpareShare) break;
     forgetBehindEnd(*run);
   }
-  if (free_.size() < pagesNeeded(rank, sorted)) {
-    const SweepPosition nearer = pageStart(kNextEighths, rank, sorted);
+  if (free_.size() < pagesNeeded(brick, sorted)) {
+    const SweepPosition nearer = pageStart(kNextEighths, brick, sorted);
     end_ = behindKey(nearer) < end_ ? behindKey(nearer) : nearer;
     for (const auto& run : live_) forgetBehindEnd(*run);
   }
@@ -313,22 +313,23 @@ void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
 }
 
 /// The pages for those splats of a part that lie in the slab.
-size_t SweepBuffer::pagesNeeded(uint32_t rank, std::span<const DepthItem> sorted) const {
-  const size_t before = countBefore(begin_, rank, sorted);
-  return pagesFor(std::max(before, countBefore(end_, rank, sorted)) - before);
+size_t SweepBuffer::pagesNeeded(uint32_t brick, std::span<const DepthItem> sorted) const {
+  const size_t before = countBefore(begin_, brick, sorted);
+  return pagesFor(std::max(before, countBefore(end_, brick, sorted)) - before);
 }
 
 /// The position at which a slab's end leaves `eighths` eighths of the buffer's pages before it. Pages are
 /// ordered by the positions of their first splats, and include those that the part to be entered would take.
-SweepPosition SweepBuffer::pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const {
+SweepPosition SweepBuffer::pageStart(size_t eighths, uint32_t brick,
+                                     std::span<const DepthItem> sorted) const {
   std::vector<SweepPosition> starts;
   for (const auto& run : live_)
     for (size_t n = run->first; n < run->count; n = (n / kPageSplats + 1) * kPageSplats)
       starts.push_back(position(*run, n));
-  const size_t before = countBefore(begin_, rank, sorted);
-  const size_t before_end = std::max(before, countBefore(end_, rank, sorted));
+  const size_t before = countBefore(begin_, brick, sorted);
+  const size_t before_end = std::max(before, countBefore(end_, brick, sorted));
   for (size_t n = before; n < before_end; n += kPageSplats)
-    starts.push_back({sorted[n].key, rank, static_cast<uint32_t>(n)});
+    starts.push_back({sorted[n].key, brick, static_cast<uint32_t>(n)});
   const auto page =
       starts.begin() + static_cast<ptrdiff_t>(std::min(pages() * eighths / 8, starts.size() - 1));
   std::nth_element(starts.begin(), page, starts.end());

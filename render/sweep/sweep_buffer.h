@@ -52,21 +52,20 @@ namespace curvisplat {
 /// The place of a splat in the drawing order of a frame.
 struct SweepPosition {
   uint32_t key = 0;
-  uint32_t rank = 0;   // of its brick among equal keys
+  uint32_t brick = 0;  // its number in the cache
   uint32_t place = 0;  // in its brick, sorted
   auto operator<=>(const SweepPosition&) const = default;
 };
 /// The end of the sweep: behind all splats.
 inline constexpr SweepPosition kSweepEnd{~uint32_t{0}, ~uint32_t{0}, ~uint32_t{0}};
 
-/// A part of the cut with its range of keys. The sweep takes parts by their first key, then by rank.
+/// A part of the cut with its range of keys. The sweep takes parts by their first key, then by brick.
 struct SweptPart {
   BrickPart part;
-  uint32_t rank = 0;
   KeyRange keys;
 
-  SweepPosition begin() const { return {keys.first, rank, 0}; }
-  SweepPosition end() const { return {keys.last, rank, ~uint32_t{0}}; }
+  SweepPosition begin() const { return {keys.first, part.brick, 0}; }
+  SweepPosition end() const { return {keys.last, part.brick, ~uint32_t{0}}; }
 };
 
 /// Shared by a frame's workers. Thread-safe, except where a function says otherwise.
@@ -90,7 +89,7 @@ class SweepBuffer {
     std::shared_ptr<Run> run;
     size_t from, to;
   };
-  /// Splats that come next in the drawing order, in pieces by rank, each sorted.
+  /// Splats that come next in the drawing order, in pieces by brick, each sorted.
   struct Batch {
     uint64_t sequence = 0;  // in the frame
     uint64_t turn = 0;      // its splats were final before this part entered; for the trace
@@ -120,9 +119,9 @@ class SweepBuffer {
   void skip();
   /// Enters a part's sorted splats and ends its turn. The caller must then fill() the run. Returns null, and
   /// does not end the turn, if there is no space or if the buffer is closed.
-  std::shared_ptr<Run> enter(uint32_t rank, std::span<const DepthItem> sorted);
+  std::shared_ptr<Run> enter(uint32_t brick, std::span<const DepthItem> sorted);
   /// Waits for space or makes it, in a turn that found neither space nor a batch. False if closed.
-  bool awaitSpace(uint32_t rank, std::span<const DepthItem> sorted);
+  bool awaitSpace(uint32_t brick, std::span<const DepthItem> sorted);
   /// Copies the splats of a run into the buffer in sorted order, from the places in `splats` that `sorted`
   /// has.
   void fill(Run& run, std::span<const DepthItem> sorted, std::span<const ScreenSplat> splats);
@@ -162,9 +161,9 @@ class SweepBuffer {
   std::optional<Batch> cut(size_t at_least) REQUIRES(mutex_);
   void splitFinals(size_t finals, bool last_may_stay) REQUIRES(mutex_);
   void endTurn() REQUIRES(mutex_);
-  void makeSpace(uint32_t rank, std::span<const DepthItem> sorted) REQUIRES(mutex_);
-  size_t pagesNeeded(uint32_t rank, std::span<const DepthItem> sorted) const REQUIRES(mutex_);
-  SweepPosition pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const
+  void makeSpace(uint32_t brick, std::span<const DepthItem> sorted) REQUIRES(mutex_);
+  size_t pagesNeeded(uint32_t brick, std::span<const DepthItem> sorted) const REQUIRES(mutex_);
+  SweepPosition pageStart(size_t eighths, uint32_t brick, std::span<const DepthItem> sorted) const
       REQUIRES(mutex_);
   void forgetBehindEnd(Run& run) REQUIRES(mutex_);
   void release(const Run& run, size_t from, size_t to) REQUIRES(mutex_);
@@ -185,7 +184,7 @@ class SweepBuffer {
   uint64_t turn_ GUARDED_BY(mutex_) = 0;
   SweepPosition begin_ GUARDED_BY(mutex_), end_ GUARDED_BY(mutex_);  // of the slab
   SweepPosition mark_ GUARDED_BY(mutex_);                            // all before it is final
-  std::vector<std::shared_ptr<Run>> live_ GUARDED_BY(mutex_);  // with splats that are in no batch; by rank
+  std::vector<std::shared_ptr<Run>> live_ GUARDED_BY(mutex_);  // with splats that are in no batch; by brick
   std::deque<SweepPosition> splits_ GUARDED_BY(mutex_);        // between batches of what is known to be final
   uint64_t split_turn_ GUARDED_BY(mutex_) = 0;                 // when that was found
   size_t entered_ GUARDED_BY(mutex_) = 0;                      // splats since finals were counted
@@ -206,7 +205,7 @@ class SweepBuffer::Run {
   size_t slot(size_t n) const { return size_t{pages[n / kPageSplats]} * kPageSplats + n % kPageSplats; }
 
   uint32_t part = 0;  // in the frame
-  uint32_t rank = 0;
+  uint32_t brick = 0;
   uint32_t before = 0;  // splats of the part that lie before the slab
   size_t first = 0, count = 0;
   size_t final_to = 0;  // when finals were counted

@@ -119,7 +119,7 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
   uint64_t expected_hidden = 0, expected_bytes = 0;
   for (uint32_t id = 0; id < cache.bricks().size(); ++id) {
     parts.push_back({id});
-    swept.push_back({{id}, id, keys.rangeOf(cache.bricks()[id])});
+    swept.push_back({{id}, keys.rangeOf(cache.bricks()[id])});
     swept.back().keys.first = 0;  // in any order, then
     if (screenBoxOf(cache.bricks()[id], settings.view).x1 >= 30) continue;
     ++expected_hidden;

@@ -28,7 +28,7 @@ SharedParts twoHalves() {
   for (int y = 0; y < side; ++y)
     for (int x = 0; x < side; ++x) shared.owners.push_back(x < side / 2 ? 0 : 1);
   for (uint32_t n = 0; n < kParts; ++n) {
-    shared.parts.push_back({{n}, n, {n, n}});
+    shared.parts.push_back({{n}, {n, n}});
     shared.preparers.push_back(n % kRanks);
   }
   return shared;

@@ -180,7 +180,7 @@ struct Scene {
   Scene(uint64_t seed, uint32_t count, uint32_t most_splats, uint32_t values) {
     std::mt19937_64 random(seed);
     for (uint32_t n = 0; n < count; ++n) {
-      SweptPart part{{n}, n, {}};
+      SweptPart part{{n}, {}};
       part.keys.first = static_cast<uint32_t>(random() % values);
       part.keys.last = static_cast<uint32_t>(
           std::min<uint64_t>(values - 1, part.keys.first + random() % (values / 4 + 1)));
@@ -209,10 +209,10 @@ struct Scene {
     std::vector<std::tuple<uint32_t, uint32_t, uint32_t, uint32_t>> all;
     for (uint32_t part = 0; part < parts.size(); ++part)
       for (uint32_t n = 0; n < keys[part].size(); ++n)
-        all.emplace_back(keys[part][n], parts[part].rank, n, part);
+        all.emplace_back(keys[part][n], parts[part].part.brick, n, part);
     std::sort(all.begin(), all.end());
     std::vector<std::pair<float, float>> order;
-    for (const auto& [key, rank, n, part] : all) order.emplace_back(part, n);
+    for (const auto& [key, brick, n, part] : all) order.emplace_back(part, n);
     return order;
   }
 };
@@ -259,11 +259,11 @@ class Sweeper {
         continue;
       }
       std::shared_ptr<SweepBuffer::Run> run;
-      while (!(run = buffer_.enter(scene_.parts[part].rank, sorted))) {
+      while (!(run = buffer_.enter(scene_.parts[part].part.brick, sorted))) {
         if (const auto batch = buffer_.nextFinal())
           hand(*batch);
         else
-          ASSERT_TRUE(buffer_.awaitSpace(scene_.parts[part].rank, sorted));
+          ASSERT_TRUE(buffer_.awaitSpace(scene_.parts[part].part.brick, sorted));
       }
       buffer_.fill(*run, sorted, splats);
     }
@@ -319,7 +319,7 @@ TEST(SweepBuffer, HoldsALayerOnly) {
   Scene scene(1, 0, 0, 1);
   std::mt19937 random(2);
   for (uint32_t n = 0; n < 100; ++n) {
-    scene.parts.push_back({{n}, n, {n * 1000, n * 1000 + 1999}});
+    scene.parts.push_back({{n}, {n * 1000, n * 1000 + 1999}});
     auto& keys = scene.keys.emplace_back(4 * kPage);
     for (uint32_t& key : keys) key = n * 1000 + static_cast<uint32_t>(random() % 2000);
   }
