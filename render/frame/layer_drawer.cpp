@@ -157,20 +157,19 @@ const IsoMeshes::Meshes* LayerDrawer::isoMeshes(const FramePlan& plan, const Fra
   wanted.variable = of_colours ? *coloured_by_ : variable_;
   if (needs_other) wanted.other = of_colours ? variable_ : *coloured_by_;
   wanted.other_is_of_opacities = of_colours;
+  wanted.keep_going = options.keep_going;
   const StageTimer timer(statistics.surfaces_s, "find isosurfaces");
-  try {
-    const IsoMeshes::Meshes* const meshes = iso_meshes_.of(cache_, wanted, throw_if_stopped);
-    if (!meshes) return nullptr;
-    const std::vector<uint32_t> bricks = bricksOf(plan.iso_parts);
-    statistics.iso_bricks = bricks.size();
-    for (const uint32_t brick : bricks) statistics.iso_splats += cache_.bricks()[brick].splats;
-    return meshes;
-  } catch (const DamagedBrick&) {
-    iso_meshes_.release();
-    if (!options.keep_going) throw;
-    // Sampling names the damaged bricks that its rays meet, and what replaces them.
-    return nullptr;
-  }
+  const IsoMeshes::Meshes* const meshes = iso_meshes_.of(cache_, wanted, throw_if_stopped);
+  // Any damaged leaf makes the isosurfaces those of the field, whether its rays meet that leaf or not.
+  PrepareStatistics unreadable;
+  for (const auto& [brick, reason] : iso_meshes_.damaged())
+    unreadable.bricks_unreadable.push_back({brick, reason});
+  combine(statistics, unreadable);
+  if (!meshes) return nullptr;
+  const std::vector<uint32_t> bricks = bricksOf(plan.iso_parts);
+  statistics.iso_bricks = bricks.size();
+  for (const uint32_t brick : bricks) statistics.iso_splats += cache_.bricks()[brick].splats;
+  return meshes;
 }
 
 /// A part of the picture after the other, each as large as its splats fit into the memory. A tile of 32x32 pixels is

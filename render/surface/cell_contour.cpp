@@ -3,10 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <limits>
+#include <map>
 #include <utility>
 #include <vector>
+
+#include "render/surface/node_gradients.h"
 
 namespace curvisplat {
 namespace {
@@ -29,16 +34,19 @@ constexpr std::array<Face, 6> kFaces{{{{0, 2, 3, 1}, {4, 1, 5, 0}},
 
 class Contour {
  public:
-  Contour(const GridNodes& nodes, double value, uint64_t most) : nodes_(nodes), value_(value), most_(most) {
+  Contour(const GridNodes& nodes, double value, uint64_t most)
+      : nodes_(nodes), gradients_(nodes), value_(value), most_(most) {
     mesh_.origin = nodes.origin();
   }
 
   std::optional<TriangleMesh> find() {
     for (const GridNodes::Block& block : nodes_.blocks())
       if (!addBlock(block)) return std::nullopt;
-    for (glm::vec3& normal : mesh_.normals) {
-      const double length = glm::length(glm::dvec3(normal));  // its square may be beyond single precision
-      normal = length > 0 ? glm::vec3(glm::dvec3(normal) / length) : glm::vec3(0, 0, 1);
+    for (size_t n = 0; n < slopes_.size(); ++n) {
+      // Where the gradient is not known, the mean of the triangles' normals.
+      glm::dvec3 normal(slopes_[n] != glm::vec3(0.0f) ? slopes_[n] : mesh_.normals[n]);
+      const double length = glm::length(normal);  // its square may be beyond single precision
+      mesh_.normals[n] = length > 0 ? glm::vec3(normal / length) : glm::vec3(0, 0, 1);
     }
     return std::move(mesh_);
   }
@@ -116,8 +124,18 @@ class Contour {
     const auto [a, b] = kEdges[edge];
     const size_t place = in_plane + (a & 1) + (a >> 1 & 1) * strides_[1];
     uint32_t& vertex = (a < 4 ? lower_ : upper_).along[edge / 4][place];
-    if (vertex == kNone) vertex = makeVertex(corners[a], corners[b]);
+    if (vertex == kNone) vertex = vertexBetween(corners[a], corners[b]);
     return vertex;
+  }
+  /// Blocks that meet, and one that closes on itself, have the vertices of their seam in common.
+  uint32_t vertexBetween(size_t a, size_t b) {
+    if (!gradients_.isShared(a) || !gradients_.isShared(b)) return makeVertex(a, b);
+    a = gradients_.representative(a);
+    b = gradients_.representative(b);
+    if (b < a) std::swap(a, b);
+    const auto [at, is_new] = of_seams_.try_emplace({a, b}, kNone);
+    if (is_new) at->second = makeVertex(a, b);
+    return at->second;
   }
   uint32_t makeVertex(size_t a, size_t b) {
     const double from = double{nodes_.value(a)} - value_, to = double{nodes_.value(b)} - value_;
@@ -127,10 +145,12 @@ class Contour {
                             ? static_cast<float>(double{nodes_.other(a)} +
                                                  part * (double{nodes_.other(b)} - double{nodes_.other(a)}))
                             : 0;
-    return pushVertex(glm::vec3(start + part * (end - start)), other);
-  }
-  uint32_t pushVertex(const glm::vec3& at, float other) {
-    mesh_.positions.push_back(at);
+    const glm::dvec3 slope_a = gradients_.at(a), slope_b = gradients_.at(b);
+    const glm::vec3 slope(slope_a + part * (slope_b - slope_a));
+    const bool known =
+        slope_a != glm::dvec3(0.0) && slope_b != glm::dvec3(0.0) && !glm::any(glm::isinf(slope));
+    slopes_.push_back(known ? slope : glm::vec3(0.0f));
+    mesh_.positions.push_back(glm::vec3(start + part * (end - start)));
     mesh_.normals.emplace_back(0.0f);
     if (nodes_.hasOther()) mesh_.scalars.push_back(other);
     return static_cast<uint32_t>(mesh_.positions.size() - 1);
@@ -164,10 +184,13 @@ class Contour {
   }
 
   const GridNodes& nodes_;
+  const NodeGradients gradients_;
   const double value_;
   const uint64_t most_;
   std::array<size_t, 3> strides_{};
   OfPlane lower_, upper_;
+  std::map<std::pair<size_t, size_t>, uint32_t> of_seams_;  // vertices between two places of several nodes
+  std::vector<glm::vec3> slopes_;                           // [vertex]: the field's gradient; 0: not known
   TriangleMesh mesh_;
 };
 

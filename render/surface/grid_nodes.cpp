@@ -108,17 +108,25 @@ bool GridNodes::canBeOf(const Manifest& manifest) {
   return !manifest.blocks.empty() && nodes == manifest.nodes;
 }
 
-uint64_t GridNodes::bytes(const Manifest& manifest, bool two_scalars) {
-  return manifest.nodes * (sizeof(float) * (two_scalars ? 8 : 7) + sizeof(JoinedNode));
+GridNodes::Bytes GridNodes::bytes(const Manifest& manifest, bool two_scalars) {
+  const uint64_t joined = sizeof(JoinedNode) * (manifest.nodes - manifest.splats);
+  const uint64_t kept = manifest.nodes * sizeof(float) * (two_scalars ? 5 : 4) + joined;
+  uint64_t more = manifest.nodes * 3 * sizeof(float);
+  uint64_t of_plane = 0;
+  for (const BlockInfo& block : manifest.blocks) {
+    of_plane = std::max(of_plane, block.ni * block.nj);
+    if (joined > 0) more += joinBytes({{block.ni, block.nj, block.nk}, 0});
+  }
+  return {kept + more + 2 * sizeof(glm::vec3) * of_plane, kept};
 }
 
 void GridNodes::Slopes::resize(size_t count) {
   for (std::vector<float>* part : {&x, &y, &z}) part->resize(count);
 }
 
-GridNodes::GridNodes(const CacheReader& cache, size_t variable, std::optional<size_t> other,
+GridNodes::GridNodes(const CacheReader& cache, size_t variable, std::optional<size_t> other, bool keep_going,
                      const std::function<void()>& throw_if_stopped)
-    : origin_(0.5 * (cache.manifest().lower + cache.manifest().upper)) {
+    : origin_(0.5 * (cache.manifest().lower + cache.manifest().upper)), keep_going_(keep_going) {
   size_t first = 0;
   for (const BlockInfo& block : cache.manifest().blocks) {
     blocks_.push_back({{block.ni, block.nj, block.nk}, first});
@@ -143,10 +151,16 @@ void GridNodes::read(const CacheReader& cache, size_t variable,
   for (uint32_t brick = 0; brick < cache.bricks().size(); ++brick) {
     if (!cache.bricks()[brick].isLeaf()) continue;
     throw_if_stopped();
-    cache.readGeometry(brick, geometry, &runs);
-    cache.readVariable(brick, variable, values);
-    addLeaf(cache, brick, geometry, values, runs);
+    try {
+      cache.readGeometry(brick, geometry, &runs);
+      cache.readVariable(brick, variable, values);
+      addLeaf(cache, brick, geometry, values, runs);
+    } catch (const DamagedBrick& error) {
+      if (!keep_going_) throw;
+      damaged_.emplace(brick, error.what());
+    }
   }
+  if (!damaged_.empty()) complete_ = false;
   if (!complete_ || !join()) return;
   const VariableInfo& info = cache.manifest().variables[variable];
   for (const Block& block : blocks_) moveToNodes(block);

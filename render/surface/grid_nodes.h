@@ -7,8 +7,8 @@
 // slope, and the correction by a few steps of a fixed point. What is left is second order: where the place is a part of a cell off, the
 // value is the one there.
 //
-// All nodes of the grid are kept, block by block, i fastest: 16 bytes a node, with a second scalar 20. One thread makes them, from leaves
-// that it reads one after the other; immutable then.
+// All nodes of the grid are kept, block by block, i fastest: 16 bytes a node, with a second scalar 20; 12 more while they are made. One
+// thread makes them, from leaves that it reads one after the other; immutable then.
 #pragma once
 
 #include <array>
@@ -16,7 +16,10 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <map>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "render/surface/joined_nodes.h"
@@ -26,23 +29,28 @@ namespace curvisplat {
 
 class GridNodes {
  public:
-  /// The most nodes of a grid: with IsoMeshes::kMaxTriangles they take no more than the field of splats gets of 96 MiB. Not a share of
+  /// The most nodes of a grid: with IsoMeshes::kMaxTriangles they take about what the field of splats gets of 96 MiB. Not a share of
   /// --memory, since pictures do not depend on that.
-  static constexpr uint64_t kMaxNodes = uint64_t{1} << 17;
+  static constexpr uint64_t kMaxNodes = uint64_t{1} << 19;
 
   /// Whether the cache may have a splat of each of its grid's nodes: of a structured grid whose values are at its nodes, none of them
   /// blanked, and of which no block covers another. From the manifest alone.
   static bool canBeOf(const Manifest& manifest);
-  /// The bytes that they take while they are made, which is the most, and without the leaf that is being read.
-  static uint64_t bytes(const Manifest& manifest, bool two_scalars);
+  /// The bytes that they take while they are made, without the leaf that is being read; and those that are kept.
+  struct Bytes {
+    uint64_t while_made, kept;
+  };
+  static Bytes bytes(const Manifest& manifest, bool two_scalars);
 
   /// Reads all leaves. `other`: a second variable, or none. `throw_if_stopped` is called between leaves. Throws as
-  /// CacheReader::readGeometry() does, and DamagedBrick if leaves have nodes outside of the grid.
-  GridNodes(const CacheReader& cache, size_t variable, std::optional<size_t> other,
+  /// CacheReader::readGeometry() does, and DamagedBrick if leaves have nodes outside of the grid; with `keep_going` damaged() has them.
+  GridNodes(const CacheReader& cache, size_t variable, std::optional<size_t> other, bool keep_going,
             const std::function<void()>& throw_if_stopped);
 
-  /// Whether they were found. Not where nodes share a splat and it could not be told which.
+  /// Whether they were found. Not where nodes share a splat and it could not be told which, or where leaves are damaged.
   bool areComplete() const { return complete_; }
+  /// The damaged leaves, with one line each that says why.
+  const std::map<uint32_t, std::string>& damaged() const { return damaged_; }
   using Block = NodeLattice3;
   const std::vector<Block>& blocks() const { return blocks_; }
   size_t size() const { return value_.size(); }
@@ -50,6 +58,8 @@ class GridNodes {
   const glm::dvec3& origin() const { return origin_; }
   glm::vec3 position(size_t node) const { return {x_[node], y_[node], z_[node]}; }
   float value(size_t node) const { return value_[node]; }
+  /// The nodes that have the place and the values of another one, in their order.
+  std::span<const JoinedNode> joined() const { return joined_; }
   bool hasOther() const { return !other_.empty(); }
   float other(size_t node) const { return other_[node]; }
 
@@ -77,6 +87,8 @@ class GridNodes {
   std::vector<Block> blocks_;
   std::vector<JoinedNode> joined_;
   bool complete_ = true;
+  const bool keep_going_;
+  std::map<uint32_t, std::string> damaged_;
   std::vector<float> x_, y_, z_, value_, other_;
   Slopes slopes_;  // of the scalar in space; while nodes are made
 };

@@ -8,9 +8,11 @@
 namespace curvisplat {
 namespace {
 
-/// The bytes of a triangle and its half of a vertex: of the mesh, its vertices on the screen and its runs in tiles; and of what it grows
-/// from.
-constexpr uint64_t kTriangleBytes = 64;
+/// The bytes of a triangle and its half of a vertex while the mesh is made: in arrays that double when they are full, with the old array
+/// beside the new one. It is more than the mesh takes with its vertices on the screen and its runs in tiles.
+constexpr uint64_t kTriangleBytes = 80;
+/// The bytes of a node while meshes are made, where nodes share splats: who has whose (NodeGradients).
+constexpr uint64_t kSharedBytes = sizeof(uint32_t) + sizeof(JoinedNode);
 
 /// The most triangles of all isosurfaces together: each cell has few of each.
 uint64_t mostTriangles(uint64_t nodes, size_t values) {
@@ -25,13 +27,15 @@ bool isSame(const ClipPlane& a, const ClipPlane& b) {
 
 bool IsoMeshes::Wanted::operator==(const Wanted& wanted) const {
   return values == wanted.values && variable == wanted.variable && other == wanted.other &&
-         other_is_of_opacities == wanted.other_is_of_opacities &&
+         other_is_of_opacities == wanted.other_is_of_opacities && keep_going == wanted.keep_going &&
          std::equal(planes.begin(), planes.end(), wanted.planes.begin(), wanted.planes.end(), isSame);
 }
 
 uint64_t IsoMeshes::bytes(const Manifest& manifest, bool two_scalars, size_t values) {
   if (!canBeOf(manifest)) return 0;
-  return GridNodes::bytes(manifest, two_scalars) + kTriangleBytes * mostTriangles(manifest.nodes, values);
+  const auto [while_made, kept] = GridNodes::bytes(manifest, two_scalars);
+  const uint64_t shared = manifest.splats < manifest.nodes ? kSharedBytes * manifest.nodes : 0;
+  return std::max(while_made, kept + shared + kTriangleBytes * mostTriangles(manifest.nodes, values));
 }
 
 const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& wanted,
@@ -41,10 +45,12 @@ const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& w
     const bool has_nodes = of_ && of_->variable == wanted.variable && of_->other == wanted.other;
     meshes_.reset();
     of_.reset();
+    damaged_.clear();
     if (!has_nodes || !nodes_) {
       nodes_.reset();
-      nodes_.emplace(cache, wanted.variable, wanted.other, throw_if_stopped);
+      nodes_.emplace(cache, wanted.variable, wanted.other, wanted.keep_going, throw_if_stopped);
     }
+    damaged_ = nodes_->damaged();
     if (nodes_->areComplete())
       contour(wanted);
     else
@@ -75,6 +81,7 @@ void IsoMeshes::contour(const Wanted& wanted) {
 void IsoMeshes::release() {
   nodes_.reset();
   meshes_.reset();
+  damaged_.clear();
   of_.reset();
 }
 

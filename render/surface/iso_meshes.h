@@ -7,9 +7,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "render/project/plane_cuts.h"
@@ -31,6 +33,7 @@ class IsoMeshes {
     size_t variable = 0;
     std::optional<size_t> other = std::nullopt;  // another variable, whose values the meshes have, too
     bool other_is_of_opacities = false;          // else they are the meshes' scalars
+    bool keep_going = false;                     // false: a damaged leaf is an error
 
     bool operator==(const Wanted& wanted) const;
   };
@@ -38,13 +41,15 @@ class IsoMeshes {
 
   /// Whether isosurfaces of the cache may be made so.
   static bool canBeOf(const Manifest& manifest) { return GridNodes::canBeOf(manifest); }
-  /// About the most that they take, with what is kept.
+  /// About the most that they take, with what is kept from picture to picture.
   static uint64_t bytes(const Manifest& manifest, bool two_scalars, size_t values);
 
-  /// The meshes; null where they are of another cache than canBeOf() says, or have too many triangles. Valid until the next call. Throws as
-  /// GridNodes does.
+  /// The meshes; null where they are of another cache than canBeOf() says, have too many triangles, or leaves are damaged. Valid until the
+  /// next call. Throws as GridNodes does.
   const Meshes* of(const CacheReader& cache, const Wanted& wanted,
                    const std::function<void()>& throw_if_stopped);
+  /// The damaged leaves that the last call to of() met, with one line each that says why.
+  const std::map<uint32_t, std::string>& damaged() const { return damaged_; }
   /// Forgets all: the cache is at another step, or the memory is needed.
   void release();
 
@@ -54,6 +59,7 @@ class IsoMeshes {
   std::optional<GridNodes> nodes_;
   std::optional<Wanted> of_;  // that the nodes and the meshes are of
   std::optional<Meshes> meshes_;
+  std::map<uint32_t, std::string> damaged_;
 };
 
 /// The meshes as surfaces of a scene, and the value of each; those that nothing is seen of are left out. `two_scalars`: of the picture.

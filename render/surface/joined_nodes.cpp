@@ -295,6 +295,15 @@ class Joiner {
 
 }  // namespace
 
+uint64_t joinBytes(const NodeLattice3& block) {
+  const auto& [ni, nj, nk] = block.size;
+  constexpr uint64_t kNodeBytes =
+      sizeof(uint8_t) + sizeof(uint32_t);  // whether it is there, and whose splat it has
+  constexpr uint64_t kFaceBytes =
+      16 + sizeof(Place) + 2 * sizeof(size_t);  // a candidate, a missing one, and its partner
+  return kNodeBytes * ni * nj * nk + 2 * kFaceBytes * (ni * nj + nj * nk + nk * ni);
+}
+
 std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,
                                                        std::span<const uint8_t> is_there,
                                                        const std::function<glm::dvec3(size_t node)>& at) {

@@ -33,6 +33,9 @@ struct JoinedNode {
   uint32_t node, same;
 };
 
+/// The bytes that finding them takes for a block.
+uint64_t joinBytes(const NodeLattice3& block);
+
 /// The partners of all nodes for which is_there[node] is 0, in the order of the nodes; none if one is not found. `at`: where a node is.
 /// Takes as long as some 10⁸ comparisons at most. Pure.
 std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,

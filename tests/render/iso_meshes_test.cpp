@@ -6,10 +6,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -21,6 +26,7 @@
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -36,11 +42,13 @@ class IsoMeshesTest : public testing::Test {
 
   CacheReader converted(const Function& function, const std::array<uint64_t, 3>& nodes = kNodes,
                         Centring centring = Centring::kNode) {
-    const FunctionGridSource source({gridBlock(nodes[0], nodes[1], nodes[2])}, 1, function, centring);
+    return converted(FunctionGridSource({gridBlock(nodes[0], nodes[1], nodes[2])}, 1, function, centring));
+  }
+  CacheReader converted(const FunctionGridSource& source) {
     ConvertOptions options;
     options.output = folder_ / "a.splats";
     options.overwrite = true;
-    options.scalars = {0};
+    for (uint32_t n = 0; n < source.description().scalars.size(); ++n) options.scalars.push_back(n);
     options.memory_bytes = uint64_t{256} << 20;
     options.limits.bucket_splats = 1000;
     Progress progress;
@@ -87,7 +95,7 @@ TEST_F(IsoMeshesTest, NodesAreFoundAgain) {
   });
   ASSERT_GT(cache.bricks().size(), 4u);
   ASSERT_TRUE(GridNodes::canBeOf(cache.manifest()));
-  const GridNodes nodes(cache, 0, std::nullopt, kNeverStopped);
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
   ASSERT_TRUE(nodes.areComplete());
   ASSERT_EQ(nodes.size(), kNodes[0] * kNodes[1] * kNodes[2]);
   std::vector<double> off_value, off_place;
@@ -120,7 +128,7 @@ TEST_F(IsoMeshesTest, PeaksAtAllPlacesAreClosed) {
       return NodeValues{bentPlace(n), {peak ? 1.0f : 0.0f}};
     });
     ASSERT_GT(cache.bricks().size(), 4u);
-    const GridNodes nodes(cache, 0, std::nullopt, kNeverStopped);
+    const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
     const auto mesh = contourCells(nodes, 0.4, {}, 1000000);
     ASSERT_TRUE(mesh);
     EXPECT_GT(mesh->triangles.size(), 500u);
@@ -147,7 +155,7 @@ TEST_F(IsoMeshesTest, AClosedBlockHasNoSeam) {
         },
         {41, 11, 11});
     ASSERT_LT(cache.manifest().splats, cache.manifest().nodes);
-    const GridNodes nodes(cache, 0, std::nullopt, kNeverStopped);
+    const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
     ASSERT_TRUE(nodes.areComplete());
     const auto mesh = contourCells(nodes, 0.3, {}, 100000);
     ASSERT_TRUE(mesh);
@@ -159,6 +167,108 @@ TEST_F(IsoMeshesTest, AClosedBlockHasNoSeam) {
                   : inner > 1 ? 0.05
                               : 0.02)
           << inner << ' ' << layer;
+  }
+}
+
+/// The largest angle between normals and the field's slope, in degrees.
+double largestTilt(const TriangleMesh& mesh, const std::function<double(const glm::dvec3&)>& field) {
+  double largest = 0;
+  for (uint32_t n = 0; n < mesh.positions.size(); ++n) {
+    glm::dvec3 slope;
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 step(0.0);
+      step[axis] = 1e-5;
+      slope[axis] = field(corner(mesh, n) + step) - field(corner(mesh, n) - step);
+    }
+    const double cosine = std::abs(glm::dot(glm::normalize(slope), glm::dvec3(mesh.normals[n])));
+    largest = std::max(largest, std::acos(std::min(1.0, cosine)) * 180 / std::numbers::pi);
+  }
+  return largest;
+}
+/// How many places have several vertices.
+size_t doubledVertices(const TriangleMesh& mesh) {
+  std::set<std::tuple<float, float, float>> places;
+  for (const glm::vec3& at : mesh.positions) places.insert({at.x, at.y, at.z});
+  return mesh.positions.size() - places.size();
+}
+
+TEST_F(IsoMeshesTest, NormalsAreTheFieldsAlsoWhereABlockClosesOnItself) {
+  const auto field = [](const glm::dvec3& at) {
+    return std::hypot(std::hypot(at.x, at.y) - 1.5, at.z - 0.5);
+  };
+  const CacheReader cache = converted(
+      [&](const GridNode& n) {
+        const double angle = 2 * std::numbers::pi * double(n.i % 40) / 40, radius = 1 + 0.1 * double(n.j);
+        const glm::dvec3 at(radius * std::cos(angle), radius * std::sin(angle), 0.1 * double(n.k));
+        return NodeValues{at, {static_cast<float>(field(at))}};
+      },
+      {41, 11, 11});
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
+  const auto mesh = contourCells(nodes, 0.3, {}, 100000);
+  ASSERT_TRUE(mesh);
+  EXPECT_EQ(doubledVertices(*mesh), 0u);
+  // The means of the triangles' normals are up to 9 degrees off.
+  EXPECT_LT(largestTilt(*mesh, field), 2);
+}
+
+TEST_F(IsoMeshesTest, BlocksThatMeetHaveOneSurface) {
+  // Three blocks: one is passed through backwards, and one lies across both.
+  const auto field = [](const glm::dvec3& at) { return glm::length(at - glm::dvec3(2.0, 1.0, 1.0)); };
+  const auto place = [](const GridNode& n) {
+    const double i = 0.1 * double(n.i), j = 0.1 * double(n.j), k = 0.1 * double(n.k);
+    if (n.block == 0) return glm::dvec3(i, j, k);
+    return n.block == 1 ? glm::dvec3(4 - i, j, 1 - k) : glm::dvec3(j, i, 1 + k);
+  };
+  const FunctionGridSource source({gridBlock(21, 21, 11), gridBlock(21, 21, 11), gridBlock(21, 41, 11)}, 2,
+                                  [&](const GridNode& n) {
+                                    const glm::dvec3 at = place(n);
+                                    return NodeValues{at, {float(field(at)), float(at.x)}};
+                                  });
+  const CacheReader cache = converted(source);
+  ASSERT_LT(cache.manifest().splats, cache.manifest().nodes);
+  IsoMeshes meshes;
+  const auto* const found = meshes.of(cache, {{0.75, 0.5}, {}, 0, 1}, kNeverStopped);
+  ASSERT_NE(found, nullptr);
+  for (size_t n = 0; n < 2; ++n) {
+    const TriangleMesh& mesh = *found->at(n);
+    ASSERT_GT(mesh.triangles.size(), 500u);
+    EXPECT_EQ(openEdges(mesh), 0u);
+    EXPECT_EQ(doubledVertices(mesh), 0u);
+    EXPECT_LT(largestTilt(mesh, field), 1.5);
+    ASSERT_EQ(mesh.scalars.size(), mesh.positions.size());
+    for (uint32_t vertex = 0; vertex < mesh.positions.size(); ++vertex) {
+      EXPECT_NEAR(field(corner(mesh, vertex)), n == 0 ? 0.75 : 0.5, 0.005);
+      EXPECT_NEAR(mesh.scalars[vertex], corner(mesh, vertex).x, 0.005);
+    }
+  }
+}
+
+TEST_F(IsoMeshesTest, DamagedLeavesAreNamed) {
+  const CacheReader cache = converted([](const GridNode& n) {
+    return NodeValues{{n.i, n.j, n.k}, {static_cast<float>(n.i)}};
+  });
+  const uint32_t last = static_cast<uint32_t>(cache.bricks().size()) - 1;
+  std::vector<uint32_t> leaves;
+  for (uint32_t brick = 0; brick <= last; ++brick)
+    if (cache.bricks()[brick].isLeaf()) leaves.push_back(brick);
+  ASSERT_GT(leaves.size(), 4u);
+  const std::vector<uint32_t> damaged{leaves[1], leaves[leaves.size() - 2]};
+  const auto damage = [](const std::filesystem::path& path, uint64_t offset) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(offset));
+    file << "damaged";
+  };
+  damage(cache.geometryPath(), cache.bricks()[damaged[0]].geometry.offset);
+  damage(cache.valuesPath(0), cache.brickVariables(0)[damaged[1]].values.offset);
+  IsoMeshes meshes;
+  IsoMeshes::Wanted wanted{{5.5}, {}};
+  EXPECT_THROW(meshes.of(cache, wanted, kNeverStopped), DamagedBrick);
+  wanted.keep_going = true;
+  for (int picture = 0; picture < 2; ++picture) {
+    EXPECT_EQ(meshes.of(cache, wanted, kNeverStopped), nullptr);
+    ASSERT_EQ(meshes.damaged().size(), 2u);
+    for (const uint32_t brick : damaged)
+      expectSays(meshes.damaged().at(brick), "brick " + std::to_string(brick));
   }
 }
 
@@ -214,7 +324,7 @@ TEST_F(IsoMeshesTest, TooManyTrianglesAreNone) {
   const CacheReader cache = converted([](const GridNode& n) {
     return NodeValues{{n.i, n.j, n.k}, {static_cast<float>((n.i + n.j + n.k) % 2)}};
   });
-  const GridNodes nodes(cache, 0, std::nullopt, kNeverStopped);
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
   EXPECT_FALSE(contourCells(nodes, 0.5, {}, 100));
 }
 
