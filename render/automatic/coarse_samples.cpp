@@ -13,8 +13,8 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMinSplats = 50'000;
-// Small grids have some points for each splat, since more tell nothing new, but no fewer than kMinSamples in all.
-constexpr size_t kMinSamples = 60'000, kMaxSamples = 300'000, kSamplesPerSplat = 16;
+// Small grids have a few points for each splat, since more tell little that is new, but no fewer than kMinSamples in all.
+constexpr size_t kMinSamples = 60'000, kMaxSamples = 300'000, kSamplesPerSplat = 4;
 constexpr uint64_t kMaxSteps = 5;
 
 /// A point of the unit cube, of a sequence that fills it evenly (Kronecker's, with powers of the root of

@@ -3,7 +3,8 @@
 //
 // Every splat of the level is represented by the same number of points inside its cell, at places and with
 // values that its shape, slope and variance give. The level is the coarsest with at least 50,000 splats, or
-// the finest, so that time and memory are bounded: at most some 500,000 points (20 MB), 0.1 to 0.3 s. Small grids have 60,000 points.
+// the finest, so that time and memory are bounded: at most some 500,000 points (20 MB), 0.1 to 0.3 s.
+// Small grids have four points a splat, and at least 60,000.
 // Functions are pure, apart from reading the cache; any thread.
 #pragma once
 

@@ -11,6 +11,7 @@
 #include <glm/vec4.hpp>
 #include <numbers>
 #include <random>
+#include <string>
 
 #include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
@@ -140,11 +141,16 @@ TEST(FirstChoice, FewSamplesLeaveNoGapsInASilhouette) {
 // 300,000 samples for few splats took most of the time of a small picture.
 TEST(FirstChoice, SmallGridsHaveFewerSamples) {
   const TemporaryFolder folder;
-  writeRandomCache(folder / "a.splats", 1, 60);
-  const CacheReader cache(folder / "a.splats");
-  const size_t samples = coarseSamples(cache, 0, glm::dvec3(1)).size();
-  EXPECT_GE(samples, 60'000u);
-  EXPECT_LE(samples, 80'000u);
+  for (const size_t most_splats : {60u, 1500u}) {
+    const auto path = folder / std::to_string(most_splats);
+    writeRandomCache(path, 1, most_splats);
+    const CacheReader cache(path);
+    size_t splats = 0;
+    for (const uint32_t brick : bricksAtALevel(cache, 50'000)) splats += cache.bricks()[brick].splats;
+    const size_t samples = coarseSamples(cache, 0, glm::dvec3(1)).size();
+    EXPECT_GE(samples, 60'000u) << splats;
+    EXPECT_LE(samples, std::max<size_t>(80'000, 4 * splats)) << splats;
+  }
 }
 
 /// A bright disc in a far field that is nearly clear: only the disc is seen.
