@@ -117,6 +117,24 @@ HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t la
   return {lo, hn::Max(hi, lo)};
 }
 
+/// What the faces leave of a splat in a block: kSome where that is not known.
+enum class Left { kNothing, kSome, kAll };
+
+/// Most blocks of a large splat lie wholly on one side of each face.
+HWY_INLINE Left leftIn(const Faces& faces, const Ellipse& e, Corner corner) {
+  constexpr float kHalf = 0.5f * (kBlockSide - 1), kSure = 1.001f;
+  const float dx = corner.x + kHalf - e.x, dy = corner.y + kHalf - e.y;
+  bool all = true;
+  for (int n = 0; n < ScreenCut::kFaces; ++n) {
+    const float by_x = faces.by_p[n] * e.a + faces.by_q[n] * e.b, by_y = faces.by_q[n] * e.c;
+    const float middle = faces.at[n] + by_x * dx + by_y * dy;
+    const float half = kHalf * (std::abs(by_x) + std::abs(by_y));
+    if (middle + half < -kSure) return Left::kNothing;
+    all = all && middle - half > kSure;
+  }
+  return all ? Left::kAll : Left::kSome;
+}
+
 /// The shade of a splat that is cut: what is left of the depths moves s by `per_deviation` a deviation.
 struct CutShade {
   Shade whole;
@@ -272,16 +290,22 @@ HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number,
 /// Looks up a splat whose pixels have to be. Returns whether anything is left of it in the block.
 HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float* footprint, int block,
                           LookedUp& out) {
-  return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}}, {work.table, footprint},
-                     cornerOf(block), out);
+  const Tables tables{work.table, footprint};
+  const Corner corner = cornerOf(block);
+  const Left left = leftIn(cut.faces, cut.e, corner);
+  if (left == Left::kNothing) return false;
+  if (left == Left::kAll) return lookUpBlock(cut.e, cut.scalar, tables, corner, out);
+  return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}}, tables, corner, out);
 }
 
 /// Paints one block of a splat that is not looked up, or is windowed. Returns whether it is saturated then.
 HWY_NOINLINE bool paintCutBlock(const TileWork& work, const CutSplat& cut, const float* footprint,
                                 int block) {
+  const Corner corner = cornerOf(block);
+  const Left left = leftIn(cut.faces, cut.e, corner);
+  if (left == Left::kNothing) return false;
   const auto in_window = [&](float* at, const DepthWindow& window) HWY_ATTR {
     const Cuts cuts{cut.faces, cut.line, window};
-    const Corner corner = cornerOf(block);
     if (cut.fit == kConstant) return paintBlock<false>(cut.e, cuts, cut.shade, footprint, at, corner);
     if (cut.fit == kParabola) return paintBlock<true>(cut.e, cuts, cut.shade, footprint, at, corner);
     LookedUp looked_up;
@@ -289,7 +313,12 @@ HWY_NOINLINE bool paintCutBlock(const TileWork& work, const CutSplat& cut, const
            paintLookedUp(looked_up, cut.lit, at);
   };
   if (cut.windowed) return paintWindows(work, block, in_window);
-  return in_window(work.tile + block * kBlockFloats, {});
+  float* const at = work.tile + block * kBlockFloats;
+  if (left == Left::kAll && cut.fit == kConstant)
+    return paintBlock<false>(cut.e, cut.shade.whole, footprint, at, corner);
+  if (left == Left::kAll && cut.fit == kParabola)
+    return paintBlock<true>(cut.e, cut.shade.whole, footprint, at, corner);
+  return in_window(at, {});
 }
 
 /// Returns those of `blocks` that are saturated then.
