@@ -148,6 +148,7 @@ class Addition {
   void newOrigin() {
     origin_ =
         std::make_unique<MeshOrigin>(*mesh_, options_.scalars, options_.blank_value, plan_, workspace_.own());
+    origin_->follow(manifest());
   }
 
   // Each rank finds these nodes for itself: it asks for them where it reads its share.

@@ -205,7 +205,7 @@ class StepAddition {
       return addGeometry();
     }
     const CacheReader cache = cache_.atStep(cache_.series().first_steps[*geometry]);
-    if (grid_) makeScratch();
+    grid_ ? makeScratch() : origin_->follow(cache.manifest());
     ValuePasses passes(cache, scalars_.size(), plan_, scratch_->path(), progress_);
     if (grid_) passes.setOverlaps(overlapsFor(cache.manifest(), *grid_, plan_.forOverlaps(), progress_));
     pass("scatter", report_.nodes, "nodes",

@@ -84,7 +84,7 @@ void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache) {
   for (size_t n = 0; n < blocks.size(); ++n) {
     const GridBlock& found = grid[n];
     const BlockInfo& expected = blocks[n];
-    if (found.nj == 1 && found.nk == 1 && expected.nj == 1 && expected.nk == 1 && found.ni != expected.ni)
+    if (found.nj == 1 && expected.nj == 1 && found.nk == expected.nk && found.ni != expected.ni)
       throw Error(
           "{}: was made from a grid of {} {}; this grid has {} and is not the one the cache was made from",
           cache.path().string(), expected.ni, expected.name, found.ni);

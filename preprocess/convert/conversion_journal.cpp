@@ -231,6 +231,7 @@ json jsonOf(const ScatteredSplats& splats) {
                     {"survey", jsonOf(splats.survey)},
                     {"degenerate", splats.counts.degenerate},
                     {"inverted", splats.counts.inverted},
+                    {"halved", splats.counts.halved},
                     {"overlap", splats.overlap},
                     {"merged_nodes", splats.merged_nodes},
                     {"sample", splats.sample_file},
@@ -243,7 +244,7 @@ json jsonOf(const ScatteredSplats& splats) {
 ScatteredSplats splatsOf(const JsonField& from) {
   ScatteredSplats splats;
   splats.survey = surveyOf(from.at("survey"));
-  splats.counts = {from.at("degenerate").count(), from.at("inverted").count()};
+  splats.counts = {from.at("degenerate").count(), from.at("inverted").count(), from.at("halved").count()};
   splats.overlap = from.at("overlap").text();
   splats.merged_nodes = from.at("merged_nodes").count();
   splats.sample_file = from.at("sample").text();

@@ -8,7 +8,6 @@
 
 #include "preprocess/convert/convert_options.h"
 #include "preprocess/convert/scan.h"
-#include "preprocess/gather/cell_slopes.h"
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/point_sums.h"
 #include "preprocess/grid/parallel.h"
@@ -31,6 +30,11 @@ MeshOrigin::MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars,
       scratch_(std::move(scratch)),
       preparation_(source.preparationFor(reader_.scalarIndices())) {
   blocks_.push_back({centring() == Centring::kCell ? "cells" : "points", samples(), 1, 1, false});
+}
+
+void MeshOrigin::follow(const Manifest& cache) {
+  slabs_ = cache.blocks.front().nk == 2 ? SlabCells::kHalved : SlabCells::kWhole;
+  blocks_.front().nk = slabs_ == SlabCells::kHalved ? 2 : 1;
 }
 
 TemporaryNeeds MeshOrigin::needsBy(const NeedsOf& needs_of) const {
@@ -132,7 +136,7 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
   if (centring() == Centring::kCell) {
     CellSlopes slopes(reader_.cells(), reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { slopes.add(cells); });
-    counts = slopes.finish(take, progress);
+    counts = slopes.finish(take, slabs_, progress);
   } else {
     PointSums sums(reader_.points(), drawn_cells_, reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { sums.add(cells); });
@@ -141,7 +145,7 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
   if (counts.splats == 0)
     throw NothingToDraw("{}: every cell has a blanked point: there is nothing to draw",
                         description().files.empty() ? description().format : description().files.front());
-  return {counts.degenerate, 0};
+  return {counts.degenerate, 0, counts.halved};
 }
 
 uint64_t MeshOrigin::finish(const SinkOfThread&, Progress&) {

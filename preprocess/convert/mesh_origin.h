@@ -19,11 +19,13 @@
 
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_origin.h"
+#include "preprocess/gather/cell_slopes.h"
 #include "preprocess/gather/gather_forecast.h"
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/gather/point_numbers.h"
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
+#include "stream/cache/manifest.h"
 
 namespace curvisplat {
 
@@ -34,9 +36,13 @@ class MeshOrigin final : public SplatOrigin {
   MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
              const MemoryPlan& plan, ScratchFiles scratch);
 
+  /// Makes splats as those of a cache were made: of cells between two faces one or two, by what its block says.
+  void follow(const Manifest& cache);
+
   const GridDescription& description() const override { return reader_.source().description(); }
   Centring centring() const override { return reader_.centring(); }
-  /// One row of samples: the points, or the cells, of all pieces.
+  /// One row of samples: the points, or the cells, of all pieces. There are two rows if it
+  /// follows a cache whose cells are two splats.
   const std::vector<GridBlock>& blocks() const override { return blocks_; }
   TemporaryNeeds mostTemporaryNeeds() const override;
   TemporaryNeeds temporaryNeeds(const Progress& progress) const override;
@@ -59,6 +65,7 @@ class MeshOrigin final : public SplatOrigin {
   const ScratchFiles scratch_;
   const MeshSource::Preparation preparation_;
   std::vector<GridBlock> blocks_;
+  SlabCells slabs_ = SlabCells::kHalved;
   std::optional<PointNumbers> numbers_;
   std::vector<bool> used_;  // [point]: a cell that is drawn has it
   uint64_t drawn_cells_ = 0, chunk_bytes_ = 0;

@@ -41,6 +41,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.upper = survey.upper;
   for (const GridBlock& block : origin.blocks())
     manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
+  if (splats.counts.halved > 0) manifest.blocks.front().nk = 2;
   manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders, kFaceLayers, kPlates};
   if (options.precision == ValuePrecision::kFine) manifest.requirements.push_back(kFineValues);
   if (options.precision == ValuePrecision::kAuto) manifest.requirements.push_back(kScaledValues);

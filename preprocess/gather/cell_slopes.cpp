@@ -278,7 +278,7 @@ void CellSlopes::tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centr
   neighbours_->append(cell / range_cells_, neighbour_);
 }
 
-void CellSlopes::makeSplats(size_t range, const TakeSplat& take, PointSums::Counts& counts) {
+void CellSlopes::makeSplats(size_t range, const TakeSplat& take, SlabCells slabs, PointSums::Counts& counts) {
   RangeOfCells cells(fields_);
   const uint64_t first_cell = range * range_cells_;
   {
@@ -287,32 +287,45 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, PointSums::Coun
                std::min(range_cells_, cells_ - first_cell));
   }
   const OuterPlanes::OfRange planes = planes_->load(range);
-  std::atomic<uint64_t> splats = 0, degenerate = 0;
+  std::atomic<uint64_t> splats = 0, degenerate = 0, halved = 0;
   parallelFor(tbb::blocked_range<size_t>(0, cells.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
     NodeSplat splat;
     std::vector<SplatScalar> values(fields_);
     std::vector<float> own(fields_), others;
     std::vector<glm::dvec3> steps;
     std::vector<OuterPlane> of_border;
-    uint64_t made = 0, flat = 0;
+    std::array<SlabHalf, 2> halves;
+    uint64_t made = 0, flat = 0, cut = 0;
     for (size_t n = part.begin(); n < part.end(); ++n) {
       const BodyRecord body = cells.body(n);
       cells.values(n, own);
       cells.neighbours(n, steps, others);
       if (!(body.body.volume > 0)) ++flat;
       splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
-      splat.border_code = meshBorderCode(planes.of(body.cell, of_border), splat.splat, kNextOfCells);
-      take(splat, values);
+      const std::span<const OuterPlane> faces = planes.of(body.cell, of_border);
       ++made;
+      if (slabs == SlabCells::kHalved && halveSlab(faces, splat, values, halves)) {
+        ++cut;
+        halves[1].splat.node += cells_;
+        for (SlabHalf& half : halves) {
+          half.splat.border_code = meshBorderCode(half.planes, half.splat.splat, kNextOfCells);
+          take(half.splat, half.values);
+        }
+        continue;
+      }
+      splat.border_code = meshBorderCode(faces, splat.splat, kNextOfCells);
+      take(splat, values);
     }
-    splats += made;
+    splats += made + cut;
     degenerate += flat;
+    halved += cut;
   });
   counts.splats += splats;
   counts.degenerate += degenerate;
+  counts.halved += halved;
 }
 
-PointSums::Counts CellSlopes::finish(const TakeSplat& take, const Progress& progress) {
+PointSums::Counts CellSlopes::finish(const TakeSplat& take, SlabCells slabs, const Progress& progress) {
   list_ = {};
   freeMemory(of_cells_);
   bodies_->close();
@@ -336,7 +349,7 @@ PointSums::Counts CellSlopes::finish(const TakeSplat& take, const Progress& prog
   PointSums::Counts counts;
   for (size_t range = 0; range < bodies_->streams(); ++range) {
     progress.throwIfStopped();
-    makeSplats(range, take, counts);
+    makeSplats(range, take, slabs, counts);
     bodies_->forget(range);
     pairs_->forget(range);
     neighbours_->forget(range);

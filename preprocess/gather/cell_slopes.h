@@ -19,6 +19,10 @@
 
 namespace curvisplat {
 
+/// Whether cells that end at two opposite faces, as those of two-dimensional cases, are one splat or two: then the second has the
+/// cell's number plus the number of cells.
+enum class SlabCells { kWhole, kHalved };
+
 class CellSlopes {
  public:
   /// Takes cells with numbers below `cells`; `fields`: at least one value each.
@@ -41,7 +45,7 @@ class CellSlopes {
   void add(const GatheredCells& cells);
 
   /// Makes the splats. Once, after all cells.
-  PointSums::Counts finish(const TakeSplat& take, const Progress& progress);
+  PointSums::Counts finish(const TakeSplat& take, SlabCells slabs, const Progress& progress);
 
  private:
   std::span<const float> valuesOf(const GatheredCells& cells, size_t n) const;
@@ -50,7 +54,7 @@ class CellSlopes {
   /// Whether both cells are of one range, and know one another now.
   bool joinInRange(uint64_t a, uint64_t b);
   void tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre, std::span<const std::byte> values);
-  void makeSplats(size_t range, const TakeSplat& take, PointSums::Counts& counts);
+  void makeSplats(size_t range, const TakeSplat& take, SlabCells slabs, PointSums::Counts& counts);
 
   const uint64_t cells_;
   const size_t fields_;

@@ -45,6 +45,7 @@ class PointSums {
   struct Counts {
     uint64_t splats = 0;
     uint64_t degenerate = 0;  // points whose cells have no volume: their splats have no weight
+    uint64_t halved = 0;      // cells that became two splats
   };
   /// Makes the splats and passes each to `take`. Call it once, after all cells have been added. Throws Error
   /// if the disk fails, Interrupted once `progress` is stopped.

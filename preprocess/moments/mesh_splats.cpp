@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 #include "preprocess/shape/merge.h"
 #include "preprocess/shape/shape.h"
@@ -212,6 +213,40 @@ VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
 }
 
 }  // namespace
+
+bool halveSlab(std::span<const OuterPlane> planes, const NodeSplat& whole,
+               std::span<const SplatScalar> values, std::array<SlabHalf, 2>& halves) {
+  if (planes.size() < 2 || !(whole.splat.weight > 0)) return false;
+  const std::optional<glm::dvec3> q = acrossPlate(joined(planes, true), whole.splat.position, whole.splat);
+  if (!q) return false;
+  const glm::dvec3 along = whole.splat.factor() * *q, normal = glm::normalize(gradientOf(whole.splat, *q));
+  const glm::dmat3 factor = whole.splat.factor();
+  const glm::dmat3 shape = factor * glm::transpose(factor) - 0.75 * glm::outerProduct(along, along);
+  for (const int side : {0, 1}) {
+    const double to_face = side == 0 ? -1 : 1;
+    SlabHalf& half = halves[static_cast<size_t>(side)];
+    half.splat = whole;
+    Splat& splat = half.splat.splat;
+    splat.position += 0.25 * to_face * along;
+    splat.weight *= 0.5;
+    setShape(splat, {shape[0][0], shape[0][1], shape[1][1], shape[0][2], shape[1][2], shape[2][2]},
+             smallestAxis(splat.position));
+    half.values.assign(values.begin(), values.end());
+    for (SplatScalar& value : half.values)
+      value.slope = inFrameOf(splat, factor * (value.slope - glm::dot(value.slope, *q) * *q));
+    half.planes.clear();
+    for (OuterPlane plane : planes) {
+      const double faces = to_face * glm::dot(normal, plane.inward) / glm::length(plane.inward);
+      if (faces > kSimilar) continue;  // the other half's
+      if (faces >= -kSimilar) {        // a side, which both share
+        plane.inward *= 0.5;
+        plane.point += 0.25 * to_face * along;
+      }
+      half.planes.push_back(plane);
+    }
+  }
+  return true;
+}
 
 uint32_t meshBorderCode(std::span<const OuterPlane> planes, const Splat& splat, double next) {
   if (!(splat.weight > 0)) return kNoBorder;

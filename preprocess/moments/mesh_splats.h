@@ -5,6 +5,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -47,6 +48,18 @@ struct OuterPlane {
   bool touches =
       true;  // it is a face of the splat's; else of one beside it, which the splat may reach beyond
 };
+
+/// A half of a splat between two opposite faces, and the faces that it ends at.
+struct SlabHalf {
+  NodeSplat splat;
+  std::vector<SplatScalar> values;
+  std::vector<OuterPlane> planes;
+};
+
+/// Halves the splat of a cell that ends at two opposite ones of these faces, so that each half ends at one of them: a border code has
+/// one face across each axis. Values do not change across. Returns false if there are no such faces.
+bool halveSlab(std::span<const OuterPlane> planes, const NodeSplat& whole,
+               std::span<const SplatScalar> values, std::array<SlabHalf, 2>& halves);
 
 /// The border code (stream/model/border_code.h) of a splat near these faces, whose order counts in the last
 /// bits. `next`: how much longer the splats behind it are, across the face.

@@ -90,10 +90,8 @@ VoxelPlanes MergedFaces::of(size_t voxel) const {
   return found;
 }
 
-namespace {
-
-/// The code of a splat between two opposite faces that both touch most of it; else kNoBorder.
-uint32_t plateCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged) {
+std::optional<glm::dvec3> acrossPlate(const VoxelPlanes& planes, const glm::dvec3& position,
+                                      const Splat& splat) {
   constexpr double kParallel = -0.9, kCovered = 0.6, kThinner = 0.75, kThicker = 1.33;
   for (size_t n = 0; n < planes.count; ++n) {
     const auto& a = planes.planes[n];
@@ -102,17 +100,15 @@ uint32_t plateCode(const VoxelPlanes& planes, const glm::dvec3& position, const 
       const double apart = glm::dot(a.inward, position - a.point) + glm::dot(b.inward, position - b.point);
       const double cosine = glm::dot(a.inward, b.inward);
       if (!(a.face && b.face && cosine < kParallel)) continue;
-      const glm::dvec3 across = glm::normalize(a.inward - b.inward) * merged.factor();
+      const glm::dvec3 across = glm::normalize(a.inward - b.inward) * splat.factor();
       const double length = glm::length(across);
       if (!(apart > kThinner * length && apart < kThicker * length)) continue;
-      if (!(std::min(a.area, b.area) * length > kCovered * merged.weight)) continue;
-      return packPlateCode(across / length);
+      if (!(std::min(a.area, b.area) * length > kCovered * splat.weight)) continue;
+      return across / length;
     }
   }
-  return kNoBorder;
+  return std::nullopt;
 }
-
-}  // namespace
 
 uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged,
                           double voxel_size) {
@@ -138,7 +134,10 @@ uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position,
       faces[at] = faces[at - 1];
     faces[at] = face;
   }
-  if (count == 0) return plateCode(planes, position, merged);
+  if (count == 0) {
+    const std::optional<glm::dvec3> across = acrossPlate(planes, position, merged);
+    return across ? packPlateCode(*across) : kNoBorder;
+  }
   std::array<glm::dvec3, 3> axes;
   size_t touched = 0;
   for (size_t n = 0; n < count && touched < 3; ++n) {

@@ -11,6 +11,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -71,6 +72,11 @@ class MergedFaces {
   std::vector<uint32_t> first_;  // [voxel]: of its sums
   std::vector<Sums> sums_;
 };
+
+/// The unit vector, in the splat's frame, from one to the other of two opposite faces that the splat fills the room between; nullopt if
+/// there are none.
+std::optional<glm::dvec3> acrossPlate(const VoxelPlanes& planes, const glm::dvec3& position,
+                                      const Splat& splat);
 
 /// The border code of a merged splat. `position`: as in VoxelMerger::add(). `voxel_size`: the least length of
 /// the splats behind it, in world units.

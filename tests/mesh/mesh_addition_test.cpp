@@ -151,6 +151,23 @@ TEST_F(MeshAddition, AScalarAddedLaterIsTheOneConvertedAtOnce) {
   }
 }
 
+TEST_F(MeshAddition, CellsOfOneLayerAreTwoSplatsEachAgain) {
+  const ArrayPiece layer = hexahedraOf(*scene_, 40, 20, 1);
+  expectAddition({shuffled(layer, 5)}, true);
+  EXPECT_EQ(CacheReader(folder_ / "added1").manifest().splats, 1600u);
+  const TwoOfEach steps[] = {TwoOfEach({layer}, 0), TwoOfEach({layer}, 1)};
+  EXPECT_EQ(convertSteps({&steps[0], &steps[1]}, 1).new_geometries, 0u);
+  const CacheReader series(folder_ / "series");
+  expectSameValues(series.atStep(1), 0, series, 0);
+  AddScalarOptions options;
+  options.cache = folder_ / "added1";
+  options.scalars = {3};
+  Progress progress;
+  expectSays(curvisplat::errorOf(
+                 [&] { addScalars(TwoOfEach({hexahedraOf(*scene_, 30, 20, 1)}), options, progress); }),
+             "was made from a grid of 800 cells; this grid has 600");
+}
+
 TEST_F(MeshAddition, OnlyWhatTheCacheDrawsNeedsTheScalar) {
   ArrayPiece holes = hexahedra_;
   for (size_t n = 0; n < holes.points.size(); n += 97)

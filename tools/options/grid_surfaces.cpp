@@ -264,9 +264,10 @@ std::string meantBy(const std::string& word, const Manifest& manifest, const Fac
   return didYouMean(word, names);
 }
 
-/// An unstructured grid is one block, a row of its samples (FORMAT.md).
+/// An unstructured grid is one block, a row of its samples, or two rows (FORMAT.md).
 bool isUnstructured(const Manifest& manifest) {
-  return manifest.blocks.size() == 1 && manifest.blocks[0].nj == 1 && manifest.blocks[0].nk == 1;
+  return manifest.blocks.size() == 1 && manifest.blocks[0].nj == 1 &&
+         (manifest.blocks[0].nk == 1 || manifest.cells);
 }
 
 size_t variableOf(const std::string& name, const CacheReader& cache) {

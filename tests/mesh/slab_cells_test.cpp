@@ -1,0 +1,170 @@
+// Meshes of one layer of cells, as two-dimensional cases are written: each cell is two splats, one at each face.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <map>
+#include <mutex>
+#include <vector>
+
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/mesh_origin.h"
+#include "preprocess/shape/shape.h"
+#include "stream/cache/cache_reader.h"
+#include "tests/reference/array_mesh.h"
+#include "tests/support/same_caches.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+const glm::dmat3 kJacobian(2, 0.3, 0, -0.4, 1, 0.2, 0, 0.1, 0.5);
+
+/// n x n sheared cells in `layers` layers.
+ArrayPiece plate(uint64_t n, uint64_t layers = 1) {
+  ArrayPiece piece;
+  for (uint64_t k = 0; k <= layers; ++k)
+    for (uint64_t j = 0; j <= n; ++j)
+      for (uint64_t i = 0; i <= n; ++i)
+        piece.points.push_back(
+            kJacobian * glm::dvec3(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)));
+  const auto at = [n](uint64_t i, uint64_t j, uint64_t k) { return i + (n + 1) * (j + (n + 1) * k); };
+  for (uint64_t k = 0; k < layers; ++k)
+    for (uint64_t j = 0; j < n; ++j)
+      for (uint64_t i = 0; i < n; ++i)
+        piece.cells.append(
+            CellKind::kHexahedron,
+            std::array{at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k), at(i, j, k + 1),
+                       at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)});
+  setValues(piece, [](const glm::dvec3& x) { return 3 + x.x - 2 * x.y; });
+  return piece;
+}
+
+/// Collects the splats that an origin makes, by number.
+class Collected : public SplatSink {
+ public:
+  struct Made {
+    NodeSplat node;
+    SplatScalar value;
+  };
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values) override {
+    const std::lock_guard lock(mutex_);
+    EXPECT_TRUE(made.emplace(splat.node, Made{splat, values.front()}).second) << splat.node;
+  }
+  std::map<uint64_t, Made> made;
+
+ private:
+  std::mutex mutex_;
+};
+
+class SlabCells : public ::testing::Test {
+ protected:
+  /// `follow`: the rows of a cache's block; 0: none.
+  std::map<uint64_t, Collected::Made> splatsOf(const ArrayMesh& mesh, uint64_t follow = 0) {
+    MeshOrigin origin(mesh, {1}, std::nullopt, MemoryPlan::of(uint64_t{512} << 20, 1, 2), folder_.path());
+    if (follow > 0) {
+      Manifest manifest;
+      manifest.blocks = {{"cells", 1, 1, follow}};
+      origin.follow(manifest);
+    }
+    Progress progress;
+    Collected sink;
+    origin.survey(progress);
+    halved_ = origin.scatter([&]() -> SplatSink& { return sink; }, {}, progress).halved;
+    return sink.made;
+  }
+
+  ConvertOptions options(const char* name = "mesh.splats") const {
+    ConvertOptions options;
+    options.output = folder_ / name;
+    options.scalars = {1};
+    options.overwrite = true;
+    options.memory_bytes = uint64_t{512} << 20;
+    return options;
+  }
+
+  const TemporaryFolder folder_;
+  uint64_t halved_ = 0;
+};
+
+TEST_F(SlabCells, EndAtBothOfTheirFaces) {
+  constexpr uint64_t kAlong = 6, kCells = kAlong * kAlong;
+  const auto made = splatsOf(ArrayMesh({plate(kAlong)}));
+  ASSERT_EQ(made.size(), 2 * kCells);
+  EXPECT_EQ(halved_, kCells);
+  const glm::dvec3 normal = glm::normalize(glm::cross(kJacobian[0], kJacobian[1]));
+  for (const auto& [number, splat] : made) {
+    const double i = static_cast<double>(number % kAlong), j = static_cast<double>(number % kCells / kAlong);
+    const auto other = made.find((number + kCells) % (2 * kCells));
+    ASSERT_NE(other, made.end());
+    const glm::dvec3 centre = kJacobian * glm::dvec3(i + 0.5, j + 0.5, 0.5);
+    const Splat& half = splat.node.splat;
+    EXPECT_LT(glm::distance(0.5 * (half.position + other->second.node.splat.position), centre), 1e-9);
+    EXPECT_NEAR(std::abs(glm::dot(normal, half.position - centre)), 0.25 * glm::dot(normal, kJacobian[2]),
+                1e-9);
+    EXPECT_NEAR(half.weight, 0.5 * glm::determinant(kJacobian), 1e-9);
+    EXPECT_NEAR(glm::determinant(half.factor()), 0.5 * glm::determinant(kJacobian), 1e-9);
+    EXPECT_EQ(splat.value.mean, other->second.value.mean);
+    // Each ends at the face that is nearer, also where it ends at the rim, too.
+    const bool is_upper = glm::dot(normal, half.position - centre) > 0;
+    const InwardAxes inward = inwardAxes(splat.node.border_code);
+    const bool rim_i = i == 0 || i == kAlong - 1, rim_j = j == 0 || j == kAlong - 1;
+    EXPECT_EQ(inward.count, 1 + rim_i + rim_j) << number;
+    double nearest = 0;
+    for (int n = 0; n < inward.count; ++n) {
+      ASSERT_TRUE(inward.hasFace(n));
+      const glm::dvec3 along = half.factor() * glm::dvec3(inward.axis[static_cast<size_t>(n)]);
+      if (std::abs(glm::dot(normal, along)) > std::abs(nearest)) nearest = glm::dot(normal, along);
+    }
+    EXPECT_NEAR(nearest, (is_upper ? -0.5 : 0.5) * glm::dot(normal, kJacobian[2]), 0.01);
+  }
+}
+
+TEST_F(SlabCells, OfALinearFieldCarryItAlongTheLayer) {
+  ArrayPiece piece = plate(8);
+  const glm::dvec3 normal = glm::normalize(glm::cross(kJacobian[0], kJacobian[1]));
+  const glm::dvec3 gradient = glm::cross(normal, glm::dvec3(1, 2, 3));
+  setValues(piece, [&](const glm::dvec3& x) { return glm::dot(gradient, x); });
+  for (const auto& [number, splat] : splatsOf(ArrayMesh({piece}))) {
+    const Splat& half = splat.node.splat;
+    // Along the layer; across it the values do not change.
+    for (const glm::dvec3& step : {kJacobian[0], kJacobian[1]})
+      EXPECT_NEAR(glm::dot(gradientOf(half, splat.value.slope), step), glm::dot(gradient, step), 2e-5);
+  }
+}
+
+TEST_F(SlabCells, OfSeveralLayersAreWhole) {
+  EXPECT_EQ(splatsOf(ArrayMesh({plate(5, 2)})).size(), 50u);
+  EXPECT_EQ(halved_, 0u);
+  converted(ArrayMesh({plate(5, 2)}), options());
+  EXPECT_EQ(CacheReader(folder_ / "mesh.splats").manifest().blocks[0].nk, 1u);
+}
+
+TEST_F(SlabCells, AreAsThoseOfTheCacheThatGetsAScalar) {
+  const ArrayMesh mesh({plate(5)});
+  EXPECT_EQ(splatsOf(mesh, 1).size(), 25u);  // of an older version
+  EXPECT_EQ(splatsOf(mesh, 2).size(), 50u);
+}
+
+TEST_F(SlabCells, HaveTheSameBytesForAnyThreadsMemoryAndRanks) {
+  const ArrayMesh meshes[] = {ArrayMesh({shuffled(plate(70), 3)}),
+                              ArrayMesh(split(plate(70), 3, [](size_t cell) { return cell / 50 % 3; }))};
+  for (const ArrayMesh& mesh : meshes) {
+    const ConvertReport report = converted(mesh, options());
+    EXPECT_NEAR(report.volume / (4900 * glm::determinant(kJacobian)), 1, 1e-4);
+    const CacheReader cache(folder_ / "mesh.splats");
+    EXPECT_EQ(cache.manifest().splats, 9800u);
+    EXPECT_EQ(cache.manifest().blocks[0].ni, 4900u);
+    EXPECT_EQ(cache.manifest().blocks[0].nk, 2u);
+    expectSameCaches(mesh, options(),
+                     {{.threads = 1, .mesh_bytes = 400'000},
+                      {.threads = 2, .mesh_bytes = 200'000},
+                      {.threads = 1, .bucket_splats = 3000, .ranks = 2},
+                      {.threads = 1, .bucket_splats = 3000, .ranks = 3}});
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
