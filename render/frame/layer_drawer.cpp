@@ -66,13 +66,15 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
                   [](const Curves& curves) { return curves.opacity < 1; });
   constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8,
                      kPointBytes = 28;
-  uint64_t bytes =
-      kSampleTileBytes * (peels ? PixelLayers::kMaxLayers : 1) * threadsOrCores(options.threads) +
-      options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
+  uint64_t bytes = kSampleTileBytes * (peels ? kMaxPeels : 1) * threadsOrCores(options.threads) +
+                   options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
              kTriangleBytes * surface.mesh->triangles.size();
-  for (const Curves& curves : options.scene->curves) bytes += kPointBytes * curves.set->positions.size();
+  for (const Curves& curves : options.scene->curves) {
+    bytes += curves.set->bytes() + kPointBytes * curves.set->positions.size();
+    if (curves.whole && curves.whole != curves.set) bytes += curves.whole->bytes();
+  }
   // Isosurfaces are of the grid's cells or of the field of splats, never of both at once.
   if (!options.scene->isovalues.empty())
     bytes += std::max(

@@ -27,6 +27,11 @@ std::pair<float, float> CurveSet::range() const {
   return low <= high ? std::pair(low, high) : std::pair(0.0f, 0.0f);
 }
 
+uint64_t CurveSet::bytes() const {
+  return positions.size() * sizeof(positions[0]) + begins.size() * sizeof(begins[0]) +
+         values.size() * sizeof(values[0]) + times.size() * sizeof(times[0]);
+}
+
 CurveSet curveSetOf(const std::vector<glm::dvec3>& points, std::vector<uint32_t> begins,
                     std::vector<float> values, std::vector<double> times) {
   CurveSet set;

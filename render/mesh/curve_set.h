@@ -29,6 +29,7 @@ struct CurveSet {
   std::vector<double> times = {};    // [positions], or none; they do not decrease along a line
 
   size_t lines() const { return begins.size() - 1; }
+  uint64_t bytes() const;
   /// The range of the values; {0, 0} without any.
   std::pair<float, float> range() const;
 };

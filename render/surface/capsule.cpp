@@ -13,7 +13,7 @@ float reachOf(const ScreenVertex& middle, const CapsuleLook& look) {
   const float radius = look.radiusAt(middle.value);
   if (!look.perspective) return radius;
   const float part = radius / look.focal;  // of the distance along the view
-  if (!(part < CapsuleLook::kNearPart)) return CapsuleLook::kEverywhere;
+  if (!(part < CapsuleLook::kNearPart) || look.isCutAt(middle)) return CapsuleLook::kEverywhere;
   const float x = (middle.x - look.middle_x) / look.focal, y = (middle.y - look.middle_y) / look.focal;
   const float out2 = x * x + y * y, out = std::sqrt(out2);
   // The tangent of the angle to the farther side of the ball.
@@ -61,11 +61,11 @@ CapsulePlace placeOn(const Capsule& capsule, const CapsuleLook& look, float x, f
   const float root = std::sqrt(std::max(radius * radius * sine2 - aside * aside, 0.0f)) / sine2;
   const float along = along0 - root * wu;
   CapsulePlace place{};
-  if (along >= 0 && along <= end && has_length) {
+  const bool of_a = along < 0 && !look.isCutAt(a), of_b = along > end && !look.isCutAt(b);
+  if (!of_a && !of_b && has_length) {
     place.normal = q + (t0 - root) * w - along * u;
     place.along = along / end;
   } else {
-    const bool of_b = along > end;
     const glm::vec3 from = of_b ? ratio * glm::vec3(x - b.x, y - b.y, 0) : q;
     const float ww = glm::dot(w, w), turned = w.x * from.y - w.y * from.x;
     const float of_end = of_b ? radius_b : radius_a;

@@ -5,6 +5,8 @@
 // first end, from which the ray's place is known as precisely as on the screen: lines and radii may be as small
 // beside the distance of the eye as they like. In perspective a width in pixels grows with the distance; the radius is
 // then that of the place where the ray passes the axis.
+// A tube of a width in world units that the near plane cuts goes on as a cylinder before its cut end: sides of it lie behind
+// that plane whose axis lies before it.
 // Nothing allocates; any thread.
 #pragma once
 
@@ -38,6 +40,8 @@ struct CapsuleLook {
 
   /// The radius on the screen, in pixels.
   float radiusAt(float value) const { return perspective && !in_pixels ? -value * radius : radius; }
+  /// Whether the near plane has cut a capsule at this end.
+  bool isCutAt(const ScreenVertex& end) const { return perspective && !in_pixels && end.value == nearest; }
 };
 
 /// Pixels of the screen that contain a capsule; in perspective they may be all.
@@ -49,7 +53,7 @@ CapsuleBox boxOf(const Capsule& capsule, const CapsuleLook& look);
 /// The place of a capsule that a point of the screen sees, or of its outline if the point lies beside it.
 struct CapsulePlace {
   glm::vec3 normal;  // in view axes, of length 1
-  float along;       // 0 at the first end, 1 at the other
+  float along;       // 0 at the first end, 1 at the other; beyond these before a cut end
 };
 CapsulePlace placeOn(const Capsule& capsule, const CapsuleLook& look, float x, float y);
 

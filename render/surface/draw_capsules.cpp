@@ -33,6 +33,7 @@ struct Setups {
   Row ax, ay, a_value, bx, by, b_value;
   Row ratio;                       // of the depths, b's to a's
   Row ux, uy, uz, length, end_z;   // from a to b
+  Row begin, end;                  // of the cylinder along the axis: infinite where the near plane cuts it
   Row radius_a, radius_b, growth;  // of the radius, along
   Row sine2, per_sine2;            // orthographic: of the angle between the axis and the view
   Row least;                       // of the values
@@ -71,7 +72,8 @@ HWY_INLINE Bounds boundsOf(const CapsuleLook& look, const End& end) {
   const F part = hn::Div(end.radius, focal);
   if constexpr (!kPerspective) return {end.radius, hn::Sub(end.value, part)};
   const F part2 = hn::Mul(part, part);
-  const auto apart = hn::Lt(part, hn::Set(d, CapsuleLook::kNearPart));
+  auto apart = hn::Lt(part, hn::Set(d, CapsuleLook::kNearPart));
+  if (!look.in_pixels) apart = hn::AndNot(hn::Eq(end.value, hn::Set(d, look.nearest)), apart);
   const F across = hn::Div(hn::Sub(end.x, hn::Set(d, look.middle_x)), focal),
           down = hn::Div(hn::Sub(end.y, hn::Set(d, look.middle_y)), focal);
   const F out2 = hn::Add(hn::Mul(across, across), hn::Mul(down, down)), out = hn::Sqrt(out2);
@@ -118,7 +120,16 @@ HWY_INLINE void setUp(const CapsuleLook& look, const SampleBox& box, size_t n, S
   hn::Store(ux, d, s.ux.at + n);
   hn::Store(uy, d, s.uy.at + n);
   hn::Store(uz, d, s.uz.at + n);
-  hn::Store(hn::IfThenElseZero(has_length, length), d, s.length.at + n);
+  const V end = hn::IfThenElseZero(has_length, length), endless = hn::Set(d, INFINITY);
+  hn::Store(end, d, s.length.at + n);
+  if (kPerspective && !look.in_pixels) {
+    const V nearest = hn::Set(d, look.nearest);
+    hn::Store(hn::IfThenElseZero(hn::Eq(av, nearest), hn::Neg(endless)), d, s.begin.at + n);
+    hn::Store(hn::IfThenElse(hn::Eq(bv, nearest), endless, end), d, s.end.at + n);
+  } else {
+    hn::Store(hn::Zero(d), d, s.begin.at + n);
+    hn::Store(end, d, s.end.at + n);
+  }
   hn::Store(hn::IfThenElseZero(has_length, ez), d, s.end_z.at + n);
   hn::Store(radius_a, d, s.radius_a.at + n);
   hn::Store(radius_b, d, s.radius_b.at + n);
@@ -203,7 +214,8 @@ HWY_INLINE bool meet(const Setups& s, size_t n, const Rays& r, Mask& meets, Meet
   if (hn::AllFalse(d, meets)) return false;
   const S root = hn::Mul(hn::Sqrt(hn::Max(left, zero)), per_sine2);
   const S along = hn::Sub(along0, hn::Mul(root, wu));
-  const auto beyond = hn::Gt(along, length), beside = hn::Or(hn::Lt(along, zero), beyond);
+  const auto beyond = hn::Gt(along, hn::Set(d, s.end.at[n]));
+  const auto beside = hn::Or(hn::Lt(along, hn::Set(d, s.begin.at[n])), beyond);
   out.t = hn::Sub(t0, root);
   out.chord = hn::Mul(hn::Set(d, 3.0f), hn::Mul(radius, hn::Sqrt(per_sine2)));
   if (hn::AllFalse(d, hn::And(meets, beside))) return true;
@@ -230,7 +242,8 @@ HWY_INLINE bool meet(const Setups& s, size_t n, const Rays& r, Mask& meets, Meet
 /// A capsule and its number.
 struct Own {
   size_t n;  // in Setups
-  uint32_t number, reach;
+  uint32_t number;
+  NumberRange inside;
 };
 
 struct Pixel {
@@ -291,10 +304,11 @@ HWY_INLINE void drawPixel(const Setups& s, const Own& own, const CapsuleLook& lo
       const auto bound_number = hn::Load(du, at.before->numbers.data() + part);
       const auto after = hn::RebindMask(d, hn::Lt(bound_number, number));
       nearer = hn::And(nearer, hn::Or(hn::Lt(bound, value), hn::And(hn::Eq(bound, value), after)));
-      const auto apart = hn::Sub(hn::Max(number, bound_number), hn::Min(number, bound_number));
       S inside = hn::Mul(meeting.chord, per_focal);
       if constexpr (kPerspective) inside = hn::Mul(inside, hn::Abs(bound));
-      const auto of_line = hn::RebindMask(d, hn::Not(hn::Lt(hn::Set(du, own.reach), apart)));
+      const auto of_others = hn::Or(hn::Lt(bound_number, hn::Set(du, own.inside.first)),
+                                    hn::Lt(hn::Set(du, own.inside.last), bound_number));
+      const auto of_line = hn::RebindMask(d, hn::Not(of_others));
       nearer = hn::AndNot(hn::And(of_line, hn::Le(hn::Sub(value, bound), inside)), nearer);
     }
     hn::Store(hn::IfThenElse(nearer, value, seen), d, pixel.values.data() + part);
@@ -381,7 +395,7 @@ HWY_INLINE void drawAll(const CapsuleWork& work, const CapsuleLook& look, const 
     gatherEnds(work, begin, setups);
     for (size_t n = 0; n < kAtOnce; n += hn::Lanes(Floats())) setUp<kPerspective>(look, box, n, setups);
     for (size_t n = 0; n < kAtOnce && begin + n < work.capsules.size(); ++n)
-      fill<kPerspective>(setups, {n, work.numbers[begin + n], work.reaches[begin + n]}, look, box,
+      fill<kPerspective>(setups, {n, work.numbers[begin + n], work.insides[begin + n]}, look, box,
                          work.depths);
   }
 }

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
+
+#include "render/mesh/curve_set.h"
 
 namespace curvisplat {
 namespace {
@@ -102,7 +105,11 @@ void SampleTile::drawSurface(const SceneTriangles& triangles, size_t surface,
 
 void SampleTile::drawCurve(const SceneTriangles& triangles, size_t curve, std::span<const uint32_t> points) {
   std::array<Capsule, kAtOnce> capsules;
-  std::array<uint32_t, kAtOnce> numbers, reaches;
+  std::array<uint32_t, kAtOnce> numbers;
+  std::array<NumberRange, kAtOnce> insides;
+  const std::vector<uint32_t>& lines = triangles.curvesOf(curve).set->begins;
+  const uint32_t first = triangles.firstOf(curve);
+  auto line_end = lines.begin();
   size_t count = 0;
   for (const uint32_t point : points) {
     const uint32_t begin = triangles.beginOf(curve, point);
@@ -110,10 +117,16 @@ void SampleTile::drawCurve(const SceneTriangles& triangles, size_t curve, std::s
     const Capsule capsule = triangles.capsuleOf(curve, point);
     if (std::isnan(capsule.a.value + capsule.b.value)) continue;
     capsules[count] = capsule;
-    numbers[count] = triangles.firstOf(curve) + point;
-    reaches[count++] = kReach * (point - begin + 1);
+    numbers[count] = first + point;
+    if (before_) {
+      if (!(point < *line_end)) line_end = std::upper_bound(line_end, lines.end(), point);
+      const uint32_t reach = kReach * (point - begin + 1), line = *(line_end - 1);
+      insides[count] = {first + (point - line > reach ? point - reach : line),
+                        first + std::min(point + reach, *line_end - 1)};
+    }
+    ++count;
   }
-  drawCapsules({std::span(capsules).first(count), numbers.data(), reaches.data(), depths_},
+  drawCapsules({std::span(capsules).first(count), numbers.data(), insides.data(), depths_},
                triangles.lookOf(curve), box());
 }
 

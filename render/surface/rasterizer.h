@@ -90,13 +90,18 @@ struct SmallTriangles {
 /// many they are. Pure but for what it writes; any thread.
 size_t drawSmallTriangles(const SmallTriangles& work, const SampleBox& box, uint32_t* left);
 
+/// Consecutive numbers, the last included.
+struct NumberRange {
+  uint32_t first, last;
+};
+
 /// Capsules of one curve, those to draw.
 struct CapsuleWork {
   std::span<const Capsule> capsules;
   const uint32_t* numbers;  // [capsules], in the scene
-  // [capsules]: with SampleBox::before, what lies in a capsule of a number that differs by no more, is the
-  // inside of the same line.
-  const uint32_t* reaches;
+  // [capsules]: with SampleBox::before, what lies in a capsule with one of these numbers is the inside of the same
+  // line.
+  const NumberRange* insides;
   TileDepths& depths;  // of the tile; kept up to date
 };
 /// Draws them, to the same bits in all instruction sets. Pure but for what it writes; any thread.

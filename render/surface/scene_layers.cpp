@@ -373,7 +373,7 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
   });
   tbb::parallel_for(size_t{0}, columns * static_cast<size_t>(bins.rows()), [&](size_t number) {
     auto& [tiles, sampled] = of_threads.local();
-    tiles.resize(sampled.hasTranslucent() ? PixelLayers::kMaxLayers : 1);
+    tiles.resize(sampled.hasTranslucent() ? kMaxPeels : 1);
     const auto column = static_cast<int>(number % columns), row = static_cast<int>(number / columns);
     size_t drawn = 0;
     while (drawn < tiles.size() &&

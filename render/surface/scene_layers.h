@@ -22,6 +22,10 @@
 
 namespace curvisplat {
 
+/// Translucent surfaces that are seen through one another at a sample, at most: more than a pixel has layers, whose last one
+/// takes what lies behind it.
+inline constexpr size_t kMaxPeels = 8;
+
 struct SceneLook {
   const ColourTable& colours;              // of scalars
   std::optional<Light> light;              // of surfaces; none: a light at the viewer
@@ -38,7 +42,7 @@ struct SceneLook {
 };
 
 /// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread
-/// (with translucent surfaces 1 MiB), and 12 bytes a vertex and at most some 8 a triangle of surfaces; the
+/// (with translucent surfaces 2 MiB), and 12 bytes a vertex and at most some 8 a triangle of surfaces; the
 /// vertices' stay in `memory`, if there is one, for the next picture.
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
                      std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,

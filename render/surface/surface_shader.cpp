@@ -222,7 +222,8 @@ void SurfaceShader::smoothJoints(size_t curve, uint32_t end, CapsulePlace& place
   const bool goes_on_after =
       next < points.size() && triangles_.beginOf(curve, next) == end && join(next, last);
   if ((place.along <= 0 && !goes_on_before) || (place.along >= 1 && !goes_on_after)) return;
-  const glm::vec3 tangent = (1 - place.along) * glm::normalize(first) + place.along * glm::normalize(last);
+  const float along = std::clamp(place.along, 0.0f, 1.0f);
+  const glm::vec3 tangent = (1 - along) * glm::normalize(first) + along * glm::normalize(last);
   const glm::vec3 across =
       place.normal - glm::dot(place.normal, tangent) / glm::dot(tangent, tangent) * tangent;
   const float length = glm::length(across);
@@ -247,7 +248,8 @@ void SurfaceShader::shadeCapsule(const Spot& spot, Point& point) const {
   if (values.empty()) return;
   const auto [from, to] = triangles_.partsOf(curve, end, capsule);
   const float begin = values[triangles_.beginOf(curve, end)];
-  const float scalar = begin + (from + place.along * (to - from)) * (values[end] - begin);
+  const float along = std::clamp(from + place.along * (to - from), 0.0f, 1.0f);
+  const float scalar = begin + along * (values[end] - begin);
   if (!std::isnan(scalar))
     point.colour = (curves.colours ? *curves.colours : tables_.colours).at(double{scalar});
 }

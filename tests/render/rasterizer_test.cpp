@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <random>
@@ -297,6 +298,89 @@ TEST_P(Rasterizer, ATranslucentTubeIsOneLayer) {
     }
   EXPECT_GT(whole, 300u);
   EXPECT_LT(several, whole / 50);  // where its end turns away from the viewer
+}
+
+TEST_P(Rasterizer, TranslucentPointsNearOneAnotherAreLayersOfTheirOwn) {
+  // Six overlapping spheres, one behind the other: five in one set, and one in the next.
+  std::vector<glm::dvec3> places;
+  for (int n = 1; n < 6; ++n) places.emplace_back(0, 0, 0.15 * n);
+  SurfaceScene scene;
+  scene.curves.push_back(lineOf(places, 0.4));
+  scene.curves[0].set = std::make_shared<CurveSet>(pointsOf(*scene.curves[0].set));
+  scene.curves.push_back(lineOf({{0, 0, 0}}, 0.4));
+  for (Curves& curves : scene.curves) curves.opacity = 0.25;
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
+  const PixelLayers layers = layersOf(scene, view, {}, {colours, {}, {}, 0});
+  float through = 1;
+  for (const PixelLayer& layer : layers.at(kSize.width / 2, kSize.height / 2)) through *= 1 - layer.colour.w;
+  EXPECT_NEAR(through, std::pow(0.75, 6), 1e-5);
+}
+
+/// The first place where a ray from the eye meets a capsule, by steps of its distance; infinite if it does not.
+double steppedTo(const CurveSet& set, double radius, const glm::dvec3& eye, const glm::dvec3& step) {
+  double t = 0, away = INFINITY;
+  for (int n = 0; n < 2000 && t < 20 && away > 1e-7; ++n) {
+    away = distanceTo(set.positions, set.origin, eye + t * step) - radius;
+    t += std::max(away, 0.0) / glm::length(step);
+  }
+  return away < 1e-5 ? t : INFINITY;
+}
+
+TEST(RasterizerNear, ATubeThroughTheNearPlaneKeepsItsSides) {
+  constexpr ImageSize kSmall{60, 36};
+  constexpr double kNear = 1;
+  Camera camera = cameraOf(Projection::kPerspective);
+  camera.view_angle_deg = 70;
+  std::mt19937 random(11);
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) / 4294967295.0;
+  };
+  size_t seen = 0, beside = 0, wrong = 0, wrong_beside = 0;
+  for (int n = 0; n < 40; ++n) {
+    // From 2 before the eye to 3 behind the near plane, and back.
+    const double radius = between(0.2, 0.6);
+    const glm::dvec3 before(between(-4, 4), between(-4, 4), 7), behind(between(-2, 2), between(-2, 2), 1);
+    SurfaceScene scene;
+    scene.curves.push_back(
+        lineOf(n % 2 == 0 ? std::vector{before, behind} : std::vector{behind, before}, 2 * radius));
+    const ScreenView view = ScreenView::of(camera, kSmall, glm::dvec3(1.0), kLowPass, kNear);
+    if (distanceTo(scene.curves[0].set->positions, scene.curves[0].set->origin, view.eye) < 1.05 * radius)
+      continue;
+    const SceneTriangles triangles(scene, view, 0);
+    const TriangleBins bins(triangles);
+    SampleTile tile;
+    for (int row = 0; row < bins.rows(); ++row) {
+      const bool any_of_tile = tile.draw(triangles, bins, 0, row);
+      for (int y = row * kSampleTileHeight; y < std::min(kSmall.height, (row + 1) * kSampleTileHeight); ++y)
+        for (int x = 0; x < kSmall.width; ++x)
+          for (size_t s = 0; s < kSamples; ++s) {
+            const double across =
+                (x + 0.5 + kSampleOffsets[s][0] / 16.0 - 0.5 * kSmall.width) / view.focal_px;
+            const double down = (y + 0.5 + kSampleOffsets[s][1] / 16.0 - 0.5 * kSmall.height) / view.focal_px;
+            const glm::dvec3 step = view.forward + across * view.right + down * view.down;
+            const double at = steppedTo(*scene.curves[0].set, radius, view.eye, step);
+            if (std::abs(at - kNear) < 1e-3) continue;
+            const bool expected = at > kNear && at < INFINITY;
+            const bool any = any_of_tile && tile.at(x, y).numbers[s] != PixelSamples::kNothing;
+            seen += expected;
+            const glm::dvec3 a = scene.curves[0].set->origin,
+                             b = a + glm::dvec3(scene.curves[0].set->positions.back());
+            const double part = glm::dot(view.eye + at * step - a, b - a) / glm::dot(b - a, b - a);
+            const bool is_beside =
+                expected && glm::dot(glm::mix(a, b, part) - view.eye, view.forward) < kNear;
+            const bool is_wrong =
+                any != expected || (any && std::abs(-1 / double{tile.at(x, y).values[s]} - at) > 2e-3 * at);
+            beside += is_beside;
+            wrong += is_wrong;
+            wrong_beside += is_beside && is_wrong;
+          }
+    }
+  }
+  EXPECT_GT(seen, 10'000u);
+  EXPECT_GT(beside, 500u);
+  EXPECT_LT(wrong, seen / 500);  // at outlines rounding decides
+  EXPECT_LT(wrong_beside, beside / 20);
 }
 
 TEST_P(Rasterizer, DrawsThePointsAtWhichALineOrItsValuesTurn) {
