@@ -162,6 +162,15 @@ TEST_F(Surfaces, APointIsALitSphereAndALineATube) {
   for (int n = 0; n <= 20; ++n) points.push_back(kCentre + (n - 10) / 10.0 * axis);
   const auto tube = curveScene(points, 0.2);
   expectWorth("line", "smooth", cylinderLayer(kCentre, axis, 0.1), tube, {43.5, 43, 42.5}, 2);
+  // A translucent one has its nearer side alone, and no joints.
+  tube->curves[0].opacity = 0.5;
+  const ReferenceLayers half = [opaque = cylinderLayer(kCentre, axis, 0.1)](const glm::dvec3& origin,
+                                                                            const glm::dvec3& direction) {
+    std::vector<ReferenceLayer> layers = opaque(origin, direction);
+    for (ReferenceLayer& layer : layers) layer.opacity = 0.5;
+    return layers;
+  };
+  expectWorth("translucent line", "smooth", half, tube, {49, 48.5, 48}, 2);
 }
 
 /// The root of the mean squared difference of pixels around which the slice goes on for `margin` pixels.
