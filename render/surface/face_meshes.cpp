@@ -7,8 +7,11 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <map>
 #include <queue>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 namespace curvisplat {
 namespace {
@@ -79,14 +82,46 @@ class Stitches {
       return uint64_t{patch.stride[0]} * patch.stride[1];
     };
     std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return size_of(a) > size_of(b); });
+    findBorders();
     for (const size_t fine : order)
-      for (size_t coarse = 0; coarse < chosen_.size(); ++coarse)
-        if (chosen_[coarse].first == chosen_[fine].first)
-          for (const size_t along : {size_t{0}, size_t{1}})
-            if (patchOf(coarse).stride[along] > patchOf(fine).stride[along]) follow(fine, coarse, along);
+      for (const auto& [coarse, along] : coarserBeside(fine)) follow(fine, coarse, along);
   }
 
  private:
+  /// A line of a part's face on which patches begin or end: the part, the axis across it, the index.
+  using Line = std::tuple<uint32_t, size_t, uint64_t>;
+  using Borders = std::map<Line, std::vector<size_t>>;
+
+  void findBorders() {
+    for (size_t n = 0; n < chosen_.size(); ++n)
+      for (const size_t across : {size_t{0}, size_t{1}}) {
+        begins_[{chosen_[n].first, across, patchOf(n).first[across]}].push_back(n);
+        ends_[{chosen_[n].first, across, endOf(patchOf(n), across)}].push_back(n);
+      }
+  }
+  /// Patches that are coarser along a line on which a patch begins or ends, and the axis of that line, in their order.
+  std::vector<std::pair<size_t, size_t>> coarserBeside(size_t fine) const {
+    std::vector<std::pair<size_t, size_t>> found;
+    const FacePatch& patch = patchOf(fine);
+    const auto add = [&](const Borders& borders, size_t across, uint64_t index) {
+      const auto beside = borders.find({chosen_[fine].first, across, index});
+      if (beside == borders.end()) return;
+      for (const size_t coarse : beside->second)
+        if (patchOf(coarse).stride[1 - across] > patch.stride[1 - across])
+          found.emplace_back(coarse, 1 - across);
+    };
+    for (const size_t across : {size_t{0}, size_t{1}}) {
+      add(ends_, across, patch.first[across]);
+      add(begins_, across, endOf(patch, across));
+    }
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
+  }
+  /// The last index of a patch along an axis.
+  uint64_t endOf(const FacePatch& patch, size_t axis) const {
+    return latticeIndex(faces_.faces()[patch.face], patch, axis, patch.nodes[axis] - 1u);
+  }
   const FacePatch& patchOf(size_t n) const { return faces_.patches()[chosen_[n].second]; }
   static size_t placeOf(const FacePatch& patch, size_t along, uint64_t n, uint64_t across) {
     return along == 0 ? across * patch.nodes[0] + n : n * patch.nodes[0] + across;
@@ -96,13 +131,10 @@ class Stitches {
     const FacePatch &fine = patchOf(fine_number), &coarse = patchOf(coarse_number);
     const GridFace& face = faces_.faces()[fine.face];
     const size_t across = 1 - along;
-    const auto end = [&](const FacePatch& patch, size_t axis) {
-      return latticeIndex(face, patch, axis, patch.nodes[axis] - 1u);
-    };
-    const bool below = fine.first[across] == end(coarse, across);
-    const bool above = end(fine, across) == coarse.first[across];
+    const bool below = fine.first[across] == endOf(coarse, across);
+    const bool above = endOf(fine, across) == coarse.first[across];
     const uint64_t from = std::max(fine.first[along], coarse.first[along]);
-    const uint64_t to = std::min(end(fine, along), end(coarse, along));
+    const uint64_t to = std::min(endOf(fine, along), endOf(coarse, along));
     if ((!below && !above) || from >= to) return;
     const uint64_t border = below ? 0 : fine.nodes[across] - 1u;
     const uint64_t of_coarse = below ? coarse.nodes[across] - 1u : 0;
@@ -131,6 +163,7 @@ class Stitches {
   const FacesReader& faces_;
   const ChosenPatches& chosen_;
   std::vector<PatchNodes>& nodes_;
+  Borders begins_, ends_;
 };
 
 void appendQuads(const GridSurface& surface, const std::pair<uint32_t, uint32_t>& chosen,
