@@ -225,5 +225,47 @@ TEST_F(GlobeOptions, TheAxesGridHasLongitudesLatitudesAndDepths) {
   }
 }
 
+TEST_F(GlobeOptions, HeightsAreStretchedAtDrawing) {
+  // The flat map was converted with 20.
+  const auto flat = [](const Words& more) {
+    return pictureOf(
+        file("flat.splats"), file("a.pfm"),
+        Words{"--axes-grid", "--view", "iso", "--points", csv("p.csv", "lon,lat,depth\n5,48,4000\n"),
+              "--clip-box=-1000,1000,4000,9000,-60,0"} +
+            more,
+        "160x120");
+  };
+  const Image whole = flat({});
+  EXPECT_EQ(flat({"--vertical-scale", "20"}).rgba, whole.rgba);
+  const Image five = flat({"--vertical-scale", "100"});
+  EXPECT_EQ(five.rgba, flat({"--scale", "1,1,5"}).rgba);
+  EXPECT_NE(five.rgba, whole.rgba);
+  // It is the factor of z where a grid has no globe.
+  run({"generate", "half-annulus", "--size", "8x8x4", "-o", file("ring")});
+  run({"convert", file("ring.xyz"), file("ring.fun"), "-o", file("ring.splats")});
+  EXPECT_EQ(pictureOf(file("ring.splats"), file("a.pfm"), {"--vertical-scale", "3"}, "60x40").rgba,
+            pictureOf(file("ring.splats"), file("a.pfm"), {"--scale", "1,1,3"}, "60x40").rgba);
+  // A camera above a place has its height in kilometres, whatever heights are scaled with.
+  const auto above = [](const Words& more) {
+    return pictureOf(file("flat.splats"), file("a.pfm"),
+                     Words{"--volume", "off", "--look-at", "5,48", "--points",
+                           csv("sea.csv", "lon,lat,depth\n4,48,0\n6,50,0\n")} +
+                         more,
+                     "160x120");
+  };
+  const Image high = above({"--from-height", "4000"});
+  expectSame(above({"--from-height", "4000", "--vertical-scale", "500"}), high);
+  EXPECT_LT(compareImages(high, above({"--from-height", "6000"})).psnr_db, kSame);
+  const auto refused = [](const std::string& cache, const Words& more, const std::string& why) {
+    expectRefused(Words{"render", file(cache + ".splats"), "-o", file("a.png"), "--vertical-scale"} + more, 2,
+                  {why});
+  };
+  refused("sea", {"3"},
+          "the data lies on a sphere, where heights have no axis of their own; convert the grid with ");
+  refused("flat", {"3", "--scale", "1,1,2"}, "--scale stretches z as well; give one of them");
+  refused("flat", {"0"}, "--vertical-scale 0");
+  refused("flat", {"1e9"}, "expected a factor that stretches z by ");
+}
+
 }  // namespace
 }  // namespace curvisplat

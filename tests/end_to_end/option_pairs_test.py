@@ -36,7 +36,7 @@ EDGES = {  # values at the edges of what an option takes, by its name
     "--size": ["1x1", "0x0", "1x16384", "65536x1", "-1x5", "12x", "3e1x4", "99999999999x99999999999"], "--range": RANGES, "--opacity-range": RANGES,
     "--tf": ["viridis_r_r", "_r", "VIRIDIS", "g.xyz", "a.splats", "/dev/null"], "--opacity": CURVES, "--gradient-opacity": CURVES,
     "--asinh": ["0,1", "0,0", "0,-1", "1e308,1e308", "0,1e-320", "0,inf"], "--opacity-asinh": ["0,1", "0,-1", "nan,1"], "--max-splats": [*COUNTS, "8M"],
-    "--scale": VECTORS, "--position": VECTORS, "--focal-point": VECTORS, "--view-up": VECTORS, "--light-direction": VECTORS, "--clip-plane": PLANES,
+    "--scale": VECTORS, "--vertical-scale": NUMBERS, "--position": VECTORS, "--focal-point": VECTORS, "--view-up": VECTORS, "--light-direction": VECTORS, "--clip-plane": PLANES,
     "--slice": PLANES, "--clip-box": ["1,0,0,1,0,1", "0,0,0,0,0,0", "nan,1,0,1,0,1", "-1e308,1e308,-1e308,1e308,-1e308,1e308", "0,1,0,1"],
     "--light": ["0.3,0.7,0.25", "2,0,0", "-1,0,0", "nan,0,0", "1,1"], "--look-at": ["0,0", "nan,0", "0,91", "1e308,0", "180,-90", "0"],
     "--shadow": NUMBERS, "--text-size": NUMBERS, "--ambient-occlusion": NUMBERS, "--from-height": NUMBERS, "--lines-time": ["past", "all", "-1", "nan", "1e308", "1e308 days"],

@@ -105,6 +105,7 @@ class Pictures(PythonTest):
                              clip_box=(0, 9, -9, 9, -9, 9), scale=(1, 1, 2), memory=256 << 20, threads=1),
                 "--view", "iso", "--clip-plane", "4,0,0,1,0,0", "--clip-plane", "0,0,1,0,0,1", "--clip-box",
                 "0,9,-9,9,-9,9", "--scale", "1,1,2")
+            self.expect_same(cache.render(size=size, view="iso", vertical_scale=3), "--view", "iso", "--vertical-scale", 3)
 
     def test_have_every_option_of_the_command(self):
         own_names = {"-o": "", "tf": "colours", "clip-plane": "clip_planes", "surface": "surfaces", "surface-colour": "surface_colours",

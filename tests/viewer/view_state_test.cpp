@@ -1,8 +1,14 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <cmath>
+#include <glm/vec3.hpp>
+#include <numbers>
+#include <optional>
+
 #include "stream/base/error.h"
 #include "tests/support/expect_error.h"
+#include "tools/view/picture_layout.h"
 #include "tools/view/saved_views.h"
 #include "tools/view/view_state.h"
 
@@ -213,6 +219,36 @@ std::string commandText(const ViewState& state, const std::string& cache = "a.sp
 
 void expectParts(const std::string& command, const std::vector<std::string>& parts) {
   for (const std::string& part : parts) expectSays(command, part);
+}
+
+TEST(ViewState, HeightsAreScaledAroundThePlaceInFocus) {
+  Globe flat{Globe::Shape::kFlat, 6371, 20, 0};
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  state.scale = {1, 1, 2};
+  state.camera.focal_point = {1, 2, 6};
+  state.camera.position = {1, -5, 9};
+  EXPECT_EQ(state.verticalScale(flat), 40);
+  EXPECT_EQ(state.verticalScale(std::nullopt), 2);
+  state.setVerticalScale(100, flat);
+  EXPECT_EQ(state.scale, glm::dvec3(1, 1, 5));
+  EXPECT_EQ(state.camera.focal_point / state.scale, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(state.camera.position - state.camera.focal_point, glm::dvec3(0, -7, 3));
+  flat.vertical_scale = -20;  // heights that point down
+  EXPECT_EQ(state.verticalScale(flat), 100);
+}
+
+TEST(PlaceText, HasDegreesOnAGlobeAndCoordinatesElsewhere) {
+  EXPECT_EQ(placeText({0.5, -2.25, 1e6}, std::nullopt), "0.5, -2.25, 1e+06");
+  const Globe lengths{Globe::Shape::kLengths, 6371, 20, 0};
+  EXPECT_EQ(placeText({0.5, -2.25, 10}, lengths), "0.5, -2.25, 10");
+  // A kilometre down, 50 times exaggerated, at 30° W, 60° N.
+  const double r = 6371 - 50, half = 0.5 * r;
+  const Globe sphere{Globe::Shape::kSphere, 6371, 50, 0};
+  EXPECT_EQ(placeText({half * std::sqrt(0.75), -half * 0.5, r * std::sqrt(0.75)}, sphere),
+            "30.000°W, 60.000°N, depth 1000 m");
+  const double degree = 6371 * std::numbers::pi / 180;
+  const Globe flat{Globe::Shape::kFlat, 6371, 2, 190};
+  EXPECT_EQ(placeText({181.5 * degree, -12.25 * degree, 0.5}, flat), "178.500°W, 12.250°S, height 250 m");
 }
 
 TEST(RenderCommand, LeavesDefaultsOut) {

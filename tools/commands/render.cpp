@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "render/annotate/globe_box.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
 #include "render/image/image_file.h"
@@ -155,6 +156,8 @@ void render(const RenderArguments& given) {
   requireSameCache(cache, ranks);
   const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step
+  const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
+  options.scale = verticallyScaled(options.scale, arguments.frame.vertical_scale, globe);
   const size_t shown = chooseVariable(cache, arguments.scalar);
   const ChosenFor drawn = drawnSteps(arguments);
   ScalarChoice choice = chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options, drawn);
@@ -191,7 +194,6 @@ void render(const RenderArguments& given) {
   const bool has_grid = arguments.annotations.shown.axes_grid;
   const bool has_box = has_grid || arguments.annotations.shown.outline;
   const Series series = cache.series();
-  const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
   const auto box_on_globe = has_grid ? boxOnGlobe(cache, globe) : std::nullopt;
   const ShownBox box =
       withGrid(shownBox(manifest, options.scale, options.clip_box, arguments.annotations.shown), box_on_globe,
@@ -309,6 +311,12 @@ void addRender(CLI::App& app) {
   addMaxSplatsOption(*command, arguments->frame.max_splats, " (default: no limit)")->group(what);
   command->add_option("--scale", arguments->frame.scale, "Scale factors sx,sy,sz of the data")
       ->capture_default_str()
+      ->group(what);
+  command
+      ->add_option(
+          "--vertical-scale", arguments->frame.vertical_scale,
+          "Vertical exaggeration factor: stretches z, of a flat map in place of the factor that it was "
+          "converted with. Numbers on axes stay true. Not for data on a sphere")
       ->group(what);
   command
       ->add_option("--clip-box", arguments->frame.clip_box,

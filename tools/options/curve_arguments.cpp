@@ -8,6 +8,7 @@
 
 #include "preprocess/formats/netcdf/cf_trajectories.h"
 #include "preprocess/formats/vtk/vtk_curves.h"
+#include "render/annotate/globe_box.h"
 #include "render/colour/function_parts.h"
 #include "render/mesh/curve_set.h"
 #include "render/surface/curve_times.h"

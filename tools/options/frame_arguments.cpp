@@ -17,8 +17,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
-
 WorldBox parseClipBox(const std::string& text) {
   const auto n = parseNumbers("--clip-box", text, "x0,x1,y0,y1,z0,z1");
   const WorldBox box{{n[0], n[2], n[4]}, {n[1], n[3], n[5]}};

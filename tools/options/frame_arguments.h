@@ -14,12 +14,15 @@
 
 namespace curvisplat {
 
+inline constexpr double kMinScale = 1e-6, kMaxScale = 1e6;  // factors of the data
+
 /// Command-line arguments as given; checked and parsed by frameOptions().
 struct FrameArguments {
   std::string size = "600x600", background = "dark";
   std::string classify = "pixel", scale = "1,1,1", memory = "512M";
   std::optional<std::string> card_memory;
   std::string lod_pixels = "1";
+  std::optional<std::string> vertical_scale;  // verticallyScaled() in globe_arguments.h
   std::optional<std::string> clip_box, max_splats;
   std::vector<std::string> clip_planes;
   bool shade = false;

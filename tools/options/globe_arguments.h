@@ -28,10 +28,10 @@ void addLookAtOptions(CLI::App& command, CameraArguments& arguments, const std::
 CameraArguments placedAbove(const CameraArguments& arguments, const std::optional<Globe>& globe,
                             const glm::dvec3& scale);
 
-/// The longitudes, latitudes and heights of the data, from a coarse level of the cache; all around the Earth from -180 degrees.
-/// nullopt if the globe has no degrees.
-std::optional<AnnotatedScene::OnGlobe> boxOnGlobe(const CacheReader& cache,
-                                                  const std::optional<Globe>& globe);
+/// The scale of a picture with --vertical-scale: heights are exaggerated by that factor, whatever the cache has been converted
+/// with. Without `text` it is `scale`. Throws UsageError on a sphere, or where `scale` stretches z as well.
+glm::dvec3 verticallyScaled(const glm::dvec3& scale, const std::optional<std::string>& text,
+                            const std::optional<Globe>& globe);
 
 /// The box that a picture has to show, after --scale, with the axes grid of `on_globe`.
 ShownBox withGrid(const ShownBox& shown, const std::optional<AnnotatedScene::OnGlobe>& on_globe,

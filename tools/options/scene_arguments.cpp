@@ -12,6 +12,7 @@
 #include <filesystem>
 
 #include "preprocess/formats/vtk/vtk_surface.h"
+#include "render/annotate/globe_box.h"
 #include "render/mesh/triangle_mesh.h"
 #include "render/surface/curve_times.h"
 #include "stream/base/error.h"
@@ -383,9 +384,9 @@ void AnnotationArguments::fill(const TextFields& fields, AnnotatedScene& scene) 
 
 void AnnotationArguments::put(const std::optional<AnnotatedScene::OnGlobe>& box,
                               AnnotatedScene& scene) const {
-  scene.on_globe = box;
-  if (!box || axis_titles) return;
-  scene.axis_titles = {"longitude", "latitude", box->isOfDepths() ? "depth [m]" : "height [m]"};
+  const std::array<std::string, 3> given = scene.axis_titles;
+  showOnGlobe(box, scene);
+  if (axis_titles) scene.axis_titles = given;
 }
 
 std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments) {

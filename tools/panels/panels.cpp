@@ -309,10 +309,25 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
   darkness("occlusion", "##occlusion", state.ambient_occlusion, "darkens what the volume surrounds; 0: none");
 }
 
+/// Draws the factor of heights; there is none on a sphere, where they have no axis of their own.
+void drawVerticalScale(ViewState& state, const std::optional<Globe>& globe, PanelActions& actions) {
+  if (globe && globe->sphere()) return;
+  auto factor = static_cast<float>(state.verticalScale(globe));
+  label("vertical scale");
+  if (ImGui::SliderFloat("##vertical scale", &factor, 0.01f, 1000, "%.3g",
+                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+    state.setVerticalScale(static_cast<double>(factor), globe);
+    actions.changed = true;
+  }
+  nameWidget("vertical scale");
+  hint("stretches z; numbers on axes and at markers stay those of the data");
+}
+
 }  // namespace
 
 void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts) {
   drawSurroundings(state, actions);
+  drawVerticalScale(state, cache_.manifest().globe, actions);
   heading("Camera");
   const bool perspective = state.camera.projection == Projection::kPerspective;
   commandButton(Command::kFit, actions, "fit");

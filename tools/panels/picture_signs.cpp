@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "tools/panels/labels.h"
+#include "tools/view/picture_layout.h"
 #include "tools/window/widgets.h"
 
 namespace curvisplat {
@@ -167,10 +168,10 @@ void drawMarkers(ViewState& state, const std::optional<Globe>& globe, PanelActio
     nameWidget(fmt::format("marker {}", n + 1));
     if (ImGui::IsItemActive()) nameWidget(fmt::format("editing marker {}", n + 1));
     ImGui::SameLine();
-    ImGui::TextWrapped("%s", fmt::format("{} {:.5g}{}{}\n{:.5g}, {:.5g}, {:.5g}", marker.scalar, marker.value,
-                                         marker.unit.empty() ? "" : " ", marker.unit, marker.point.x,
-                                         marker.point.y, marker.point.z)
-                                 .c_str());
+    ImGui::TextWrapped(
+        "%s", fmt::format("{} {:.5g}{}{}\n{}", marker.scalar, marker.value, marker.unit.empty() ? "" : " ",
+                          marker.unit, placeText(marker.point, globe))
+                  .c_str());
     hint(fmt::format("block {}, i {}, j {}, k {}", marker.block + 1, marker.i, marker.j, marker.k).c_str());
     if (n > 0) drawDistance(state.markers[n - 1], marker, globe);
     ImGui::PopID();
@@ -223,12 +224,12 @@ Marker markerOf(const ViewState& state, const VariableInfo& variable, const glm:
           found.k};
 }
 
-std::string textOf(const Marker& marker, size_t blocks, bool cells) {
+std::string textOf(const Marker& marker, const Manifest& manifest) {
   const std::string unit = marker.unit.empty() ? "" : " " + marker.unit;
-  const std::string block = blocks > 1 ? fmt::format("block {}, ", marker.block + 1) : "";
-  return fmt::format("{} {:.5g}{} at {:.5g}, {:.5g}, {:.5g}; {} {}i {}, j {}, k {}", marker.scalar,
-                     marker.value, unit, marker.point.x, marker.point.y, marker.point.z,
-                     cells ? "cell" : "node", block, marker.i, marker.j, marker.k);
+  const std::string block = manifest.blocks.size() > 1 ? fmt::format("block {}, ", marker.block + 1) : "";
+  return fmt::format("{} {:.5g}{} at {}; {} {}i {}, j {}, k {}", marker.scalar, marker.value, unit,
+                     placeText(marker.point, manifest.globe), manifest.cells ? "cell" : "node", block,
+                     marker.i, marker.j, marker.k);
 }
 
 }  // namespace curvisplat

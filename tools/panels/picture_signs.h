@@ -53,6 +53,6 @@ Marker markerOf(const ViewState& state, const VariableInfo& variable, const glm:
                 const ProbeResult& found);
 
 /// "density 1.25 kg/m3 at 0.1, 0.2, 0.3; block 2, i 3, j 4, k 5". `blocks`: how many there are.
-std::string textOf(const Marker& marker, size_t blocks, bool cells);
+std::string textOf(const Marker& marker, const Manifest& manifest);
 
 }  // namespace curvisplat

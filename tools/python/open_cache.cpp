@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "render/annotate/annotations.h"
+#include "render/annotate/globe_box.h"
 #include "stream/base/error.h"
 #include "tools/options/globe_arguments.h"
 #include "tools/options/option_parsers.h"
@@ -152,7 +153,8 @@ PictureArguments pictureArguments(const Options& function, const Options& camera
           annotationArguments(frame, others),
           stepArguments(frame, others),
           valueChannels(given(frame, "channels"), "picture.exr"),
-          parseBackend(of<std::string>(others, "backend"))};
+          parseBackend(of<std::string>(others, "backend")),
+          given(frame, "vertical_scale")};
 }
 
 namespace {
@@ -277,6 +279,8 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     goTo(chosenSteps(arguments.steps, reader_).front());
     const Manifest manifest = reader_.manifest();
     FrameOptions frame = arguments.frame;
+    const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
+    frame.scale = verticallyScaled(frame.scale, arguments.vertical_scale, globe);
     const size_t shown = chooseVariable(reader_, arguments.scalar);
     ScalarChoice choice =
         chooseScalars(arguments.opacity, arguments.scalar, reader_, shown, frame, ChosenFor::kStep);
@@ -290,7 +294,6 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);
     frame.size = dataSize(annotations, size, functions);
     if (!(annotations == Annotations{})) frame.output_bytes += annotatedBytes(size, frame.size);
-    const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
     const auto box_on_globe = annotations.axes_grid ? boxOnGlobe(reader_, globe) : std::nullopt;
     const ShownBox box =
         withGrid(shownBox(manifest, frame.scale, frame.clip_box, annotations), box_on_globe, frame.scale);

@@ -41,6 +41,7 @@ struct PictureArguments {
   StepArguments steps;  // of one step
   ValueChannels channels;
   Backend backend = Backend::kAutomatic;
+  std::optional<std::string> vertical_scale = std::nullopt;
 };
 
 CameraArguments cameraArguments(const Options& camera);

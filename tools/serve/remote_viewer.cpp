@@ -192,6 +192,7 @@ class RemoteViewer::Work {
       frames_.reset();  // frees its memory before the next one allocates
       frames_ = std::make_unique<FrameLoop>(reader, limits_.backend, [this] { viewer_.wake(); });
       cache_ = view.cache;
+      globe_grid_ = {};
       damaged_said_.clear();
       asked_.clear();
     }
@@ -271,7 +272,8 @@ class RemoteViewer::Work {
     }
     const Manifest& manifest = caches_.reader(cache_).manifest();
     const ShownFunctions functions(asked.state, manifest);
-    const AnnotatedScene scene = sceneOf(asked.state, functions, frame, asked.picture);
+    const AnnotatedScene scene = sceneOf(asked.state, functions, frame, asked.picture,
+                                         globe_grid_.boxOf(asked.state, caches_.reader(cache_)));
     const Image picture = annotated(std::move(frame.image), asked.state.annotations, scene);
     PictureHeader header;
     header.picture = ++pictures_;
@@ -299,6 +301,7 @@ class RemoteViewer::Work {
   std::optional<ShownValues> values_;  // of the newest request, once they were asked for
   bool woken_ = false;
   size_t cache_ = 0;
+  GlobeGrid globe_grid_;  // of that cache
   std::string function_text_;
   uint64_t function_version_ = 0;
   std::deque<Asked> asked_;

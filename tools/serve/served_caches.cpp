@@ -124,6 +124,12 @@ std::string ServedCaches::cacheText(const OpenRequest& request) const {
   Json json = {{"type", "cache"}, {"cache", request.cache}, {"name", cache.name}};
   json["lower"] = jsonOf(manifest.lower);
   json["upper"] = jsonOf(manifest.upper);
+  json["globe"] = nullptr;
+  if (manifest.globe)
+    json["globe"] = {{"sphere", manifest.globe->sphere()},
+                     {"degrees", manifest.globe->degrees()},
+                     {"radius", manifest.globe->radius_km},
+                     {"vertical_scale", manifest.globe->vertical_scale}};
   json["samples"] = manifest.nodes;
   json["scalars"] = Json::array();
   for (const VariableInfo& variable : manifest.variables)

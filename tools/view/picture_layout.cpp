@@ -1,11 +1,15 @@
 #include "tools/view/picture_layout.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
 
+#include "render/annotate/globe_box.h"
 #include "render/frame/frame_plan.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
@@ -58,11 +62,33 @@ ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize
 }
 
 AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
-                       ImageSize picture) {
+                       ImageSize picture, const std::optional<AnnotatedScene::OnGlobe>& box) {
   AnnotatedScene scene{picture,          frame.view,       functions.bars(),
                        frame.data.lower, frame.data.upper, state.background()};
   scene.text_size = state.annotations.text_size;
+  showOnGlobe(box, scene);
   return scene;
+}
+
+const std::optional<AnnotatedScene::OnGlobe>& GlobeGrid::boxOf(const ViewState& state,
+                                                               const CacheReader& cache) {
+  static const std::optional<AnnotatedScene::OnGlobe> kNone;
+  if (!state.annotations.axes_grid) return kNone;
+  if (std::exchange(is_found_, true)) return box_;
+  try {
+    box_ = boxOnGlobe(cache, cache.manifest().globe);
+  } catch (const Error&) {  // drawing the data reports it
+  }
+  return box_;
+}
+
+std::string placeText(const glm::dvec3& point, const std::optional<Globe>& globe) {
+  if (!globe || !globe->degrees()) return fmt::format("{:.5g}, {:.5g}, {:.5g}", point.x, point.y, point.z);
+  const glm::dvec3 place = globe->geographic(point);
+  const double east = std::remainder(place.x, 360);
+  return fmt::format("{:.3f}°{}, {:.3f}°{}, {} {:.0f} m", std::abs(east), east < 0 ? "W" : "E",
+                     std::abs(place.y), place.y < 0 ? "S" : "N", place.z < 0 ? "depth" : "height",
+                     1000 * std::abs(place.z));
 }
 
 std::optional<glm::dvec3> pointSeenAt(const ShownValues& shown, const Manifest& manifest,

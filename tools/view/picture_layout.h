@@ -16,6 +16,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/probe.h"
+#include "stream/model/globe.h"
 #include "tools/view/frame_loop.h"
 #include "tools/view/view_state.h"
 
@@ -39,9 +40,23 @@ class ShownFunctions {
 /// The part of a picture that shows the data.
 ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize picture);
 
-/// The annotations of a frame that was drawn for this state.
+/// The box of the axes grid of data on a globe, found once a picture has that grid and kept for a cache.
+class GlobeGrid {
+ public:
+  /// nullopt: the picture has no axes grid, or the data no degrees, or it cannot be read: the picture says so.
+  const std::optional<AnnotatedScene::OnGlobe>& boxOf(const ViewState& state, const CacheReader& cache);
+
+ private:
+  bool is_found_ = false;
+  std::optional<AnnotatedScene::OnGlobe> box_;
+};
+
+/// The annotations of a frame that was drawn for this state; `box`: GlobeGrid::boxOf().
 AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
-                       ImageSize picture);
+                       ImageSize picture, const std::optional<AnnotatedScene::OnGlobe>& box);
+
+/// A point of the data as people read it: "4.250°E, 52.100°N, depth 120 m" on a globe, elsewhere its coordinates.
+std::string placeText(const glm::dvec3& point, const std::optional<Globe>& globe);
 
 /// The point, in data coordinates, where the ray through `pixel` of a picture of `size` has half of its
 /// opacity. nullopt where nothing is seen.

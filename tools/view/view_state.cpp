@@ -301,6 +301,18 @@ std::optional<glm::dvec3> ViewState::lightFrom() const {
   return Light::kShadowsFrom;
 }
 
+double ViewState::verticalScale(const std::optional<Globe>& globe) const {
+  return scale.z * (globe ? std::abs(globe->vertical_scale) : 1);
+}
+
+void ViewState::setVerticalScale(double factor, const std::optional<Globe>& globe) {
+  const double stretched = factor / (globe ? std::abs(globe->vertical_scale) : 1);
+  const double rise = camera.focal_point.z * (stretched / scale.z - 1);
+  camera.focal_point.z += rise;
+  camera.position.z += rise;
+  scale.z = stretched;
+}
+
 FrameOptions ViewState::frameOptions(ImageSize size) const {
   FrameOptions options;
   options.size = size;

@@ -124,6 +124,10 @@ struct ViewState {
   /// The opacity of faces as they are drawn: without a scalar there is no function.
   SheetOpacity opacityOf(const NamedFaces& named) const;
   FaceNames faceNames() const;
+  /// The factor by which heights are exaggerated: z, and on a flat map what the cache was converted with as well.
+  double verticalScale(const std::optional<Globe>& globe) const;
+  /// Changes it, and keeps the same place in focus.
+  void setVerticalScale(double factor, const std::optional<Globe>& globe);
   /// The options of a frame whose grid surfaces have their look; their faces are found by faceNames().
   FrameOptions frameOptions(ImageSize size) const;
 };

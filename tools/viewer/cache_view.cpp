@@ -262,7 +262,8 @@ void CacheView::restartFrames() {
 void CacheView::annotate() {
   if (!same(shown_->options.size, data_size_)) return;  // the window or the bars have changed meanwhile
   const ShownFunctions functions(state_, manifest());
-  const AnnotatedScene scene = sceneOf(state_, functions, *shown_, picture_size_);
+  const AnnotatedScene scene =
+      sceneOf(state_, functions, *shown_, picture_size_, globe_grid_.boxOf(state_, cache_));
   overlay_.set(annotationLayer(state_.annotations, scene), picture_size_);
   window_.redraw();
   shown_strip_ = 1 - static_cast<double>(data_size_.width) / picture_size_.width;

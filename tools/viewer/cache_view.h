@@ -233,6 +233,7 @@ class CacheView {
 
   std::optional<ShownValues> values_;
   PointProbe probe_;
+  GlobeGrid globe_grid_;
   FunctionChooser chooser_;
   std::future<SurfaceFile> reading_surface_;  // that is to be added
   struct FoundIsosurface {

@@ -143,7 +143,7 @@ void CacheView::probe(const WindowLayout& layout) {
     return;
   }
   const Marker marker = markerOf(state_, variable, answer->question.point, *answer->found);
-  probed_ = textOf(marker, manifest().blocks.size(), manifest().cells);
+  probed_ = textOf(marker, manifest());
   // Its nodes are not those of the grid.
   if (preview_) probed_ = probed_.substr(0, probed_.find(';')) + ", of the preview";
   if (!for_marker) return;
@@ -207,7 +207,8 @@ void CacheView::savePictureIfFinal() {
     file = fmt::format("{}_{:04}.png", cache_.wholePath().stem().string(), number);
   try {
     const ShownFunctions functions(state_, manifest());
-    const AnnotatedScene scene = sceneOf(state_, functions, *shown_, picture_size_);
+    const AnnotatedScene scene =
+        sceneOf(state_, functions, *shown_, picture_size_, globe_grid_.boxOf(state_, cache_));
     writeImage(annotated(shown_->image, state_.annotations, scene), file);
     reports_.settle(About::kSaving);
     say("saved " + fs::absolute(file).string() +

@@ -82,7 +82,8 @@ class MovieFrames {
     drawn.view = player_->renderer().screenView(camera, options_);
     drawn.data = {movie_.cache.manifest().lower, movie_.cache.manifest().upper};
     drawn.image = drawWithEnough(player_->renderer(), camera, options_, drawn.statistics, of_frame);
-    const AnnotatedScene shown = sceneOf(state_, *functions_, drawn, size_);
+    const AnnotatedScene shown =
+        sceneOf(state_, *functions_, drawn, size_, globe_grid_.boxOf(state_, movie_.cache));
     return annotated(std::move(drawn.image), state_.annotations, shown);
   }
 
@@ -134,6 +135,7 @@ class MovieFrames {
   std::vector<GridSurface> faces_;
   std::optional<ShownFunctions> functions_;
   std::optional<StepPlayer> player_;
+  GlobeGrid globe_grid_;
 };
 
 }  // namespace

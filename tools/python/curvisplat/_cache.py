@@ -347,7 +347,7 @@ class Cache:
                view_up: Optional[Vector] = None, parallel_scale: Optional[float] = None,
                view_angle: Optional[float] = None, azimuth: Optional[float] = None, elevation: Optional[float] = None,
                roll: Optional[float] = None, zoom: Optional[float] = None, scale: Vector = (1, 1, 1),
-               clip_box: Optional[Vector] = None,
+               vertical_scale: Optional[float] = None, clip_box: Optional[Vector] = None,
                clip_planes: Sequence[Vector] = (), step: Optional[int] = None, time: Optional[float] = None,
                interpolate: bool = False, surfaces: Union[str, Sequence[str]] = (), surface_colours: Union[str, Sequence[str]] = (),
                surface_by: str = "", surface_opacity: Union[float, str, Sequence[Union[float, str]]] = (), slices: Sequence[Vector] = (),
@@ -386,7 +386,8 @@ class Cache:
         picture's height) or view_angle (perspective, degrees). azimuth, elevation and roll (degrees) turn it, whether given
         or chosen, and zoom magnifies.
 
-        scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny,
+        scale: factors of the data along x, y, z. vertical_scale: exaggerates heights instead, of a flat map in place of the
+        factor that it was converted with. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny,
         nz) each; nothing is drawn where n does not point.
 
         step: of a series; or time: the step nearest to it, with interpolate what lies between two.
@@ -433,7 +434,7 @@ class Cache:
         of_two = _given(opacity_by=opacity_by or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh,
                         opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf), iso_by=iso_by or None)
         frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
-                       scale=scale, memory=str(memory), card_memory=None if card_memory is None else str(card_memory),
+                       scale=scale, vertical_scale=vertical_scale, memory=str(memory), card_memory=None if card_memory is None else str(card_memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction, shadow=shadow, ambient_occlusion=ambient_occlusion,
                        gradient_opacity=None if gradient_opacity is None else _opacities(gradient_opacity),
                        max_splats=None if max_splats is None else str(max_splats),
