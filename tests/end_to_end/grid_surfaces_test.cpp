@@ -276,6 +276,50 @@ TEST_F(GridSurfaceOptions, VerifyFindsDamagedFaces) {
   expectSays((of_table.out + of_table.err), "faces.bin: has a wrong checksum");
 }
 
+/// A grid of 9 x 7 x 5 nodes whose velocity is zero at k = 0 from i = `first` on, and nowhere else.
+void writeFlow(const std::string& file, int first) {
+  std::ofstream out(file);
+  out << "# vtk DataFile Version 3.0\nflow\nASCII\nDATASET STRUCTURED_GRID\nDIMENSIONS 9 7 5\nPOINTS 315 "
+         "float\n";
+  const auto forEachNode = [](const auto& write) {
+    for (int k = 0; k < 5; ++k)
+      for (int j = 0; j < 7; ++j)
+        for (int i = 0; i < 9; ++i) write(i, j, k);
+  };
+  forEachNode([&](int i, int j, int k) { out << i << ' ' << j << ' ' << k << '\n'; });
+  out << "POINT_DATA 315\n";
+  for (const char* name : {"u", "v", "w"}) {
+    out << "SCALARS " << name << " float\nLOOKUP_TABLE default\n";
+    // The third component is zero everywhere, as in a flow along a plane.
+    forEachNode([&](int i, int j, int k) {
+      out << (*name == 'u' && (k > 0 || i < first) ? 1 + 0.1 * k
+              : *name == 'v' && k > 0              ? 0.5 * j
+                                                   : 0)
+          << '\n';
+    });
+  }
+}
+
+/// Walls are where the flow rests, if the grid has no boundary conditions.
+TEST_F(GridSurfaceOptions, WallsAreWhereTheVelocityIsZero) {
+  for (const auto& [first, same] : {std::pair(0, "kmin"), {4, "kmin:i=4-8"}}) {
+    const std::string stem = fmt::format("flow{}", first);
+    writeFlow(file(stem + ".vtk"), first);
+    run({"convert", file(stem + ".vtk"), "-o", file(stem + ".splats"), "--refine", "1"});
+    const auto picture = [&](const std::string& faces) {
+      run(render({"--surface", faces, "--volume", "off"}, stem + ".splats"));
+      return readImage(file("a.pfm"));
+    };
+    const Image walls = picture("walls");
+    EXPECT_EQ(walls.rgba, picture(same).rgba) << same;
+    EXPECT_NE(walls.rgba, picture("kmax").rgba);
+    expectSays(run({"info", file(stem + ".splats")}).out, "walls");
+  }
+  // One component does not tell.
+  run({"convert", file("flow0.vtk"), "-o", file("u.splats"), "--scalar", "u"});
+  expectRefused(render({"--surface", "walls"}, "u.splats"), 1, {"names no face of the cache"});
+}
+
 TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
   const struct {
     Words options;

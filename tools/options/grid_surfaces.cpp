@@ -11,6 +11,7 @@
 #include "stream/base/name_list.h"
 #include "stream/base/text.h"
 #include "tools/options/picture_choice.h"
+#include "tools/options/still_faces.h"
 
 namespace curvisplat {
 namespace {
@@ -100,6 +101,12 @@ bool isWall(const FaceRegion& region) {
   return region.type.starts_with("BCWall");
 }
 
+/// The parts of a grid without boundary conditions where its flow rests.
+std::vector<GridSurface::Part> wallsByFlow(const CacheReader& cache, const FacesReader& faces) {
+  return stillParts(cache.manifest(), faces,
+                    [&](const std::string& scalar) { return facesWith(scalar, cache); });
+}
+
 /// Lists the faces of the cache, for messages.
 std::string whatThereIs(const FacesReader& faces, const Manifest& manifest) {
   std::vector<std::string> names;
@@ -123,8 +130,8 @@ uint64_t lastIndexOf(const Manifest& manifest, size_t n, int axis) {
 
 class FaceFinder {
  public:
-  FaceFinder(const FacesReader& faces, const Manifest& manifest, GridSurface& surface)
-      : faces_(faces), manifest_(manifest), surface_(surface) {}
+  FaceFinder(const FacesReader& faces, const CacheReader& cache, GridSurface& surface)
+      : faces_(faces), cache_(cache), manifest_(cache.manifest()), surface_(surface) {}
 
   /// Whether the word named any face.
   bool add(const std::string& word) {
@@ -134,6 +141,8 @@ class FaceFinder {
         if (faces_.faces()[n].side != FaceSide::kPlane) addFace(n, {});
     } else if (word == "walls") {
       addRegions(isWall);
+      if (surface_.parts.size() == before)  // a grid without boundary conditions
+        for (const GridSurface::Part& part : wallsByFlow(cache_, faces_)) addPart(part);
     } else if (const auto name = parseFaceName(word)) {
       for (uint32_t n = 0; n < faces_.faces().size(); ++n)
         if (isNamed(faces_.faces()[n], *name)) addFace(n, *name);
@@ -203,6 +212,7 @@ class FaceFinder {
   }
 
   const FacesReader& faces_;
+  const CacheReader& cache_;
   const Manifest& manifest_;
   GridSurface& surface_;
 };
@@ -312,7 +322,7 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
         path, text);
   GridSurface surface;
   surface.faces = faces;
-  FaceFinder finder(*faces, cache.manifest(), surface);
+  FaceFinder finder(*faces, cache, surface);
   for (size_t begin = 0; begin <= text.size();) {
     const size_t end = std::min(text.find(',', begin), text.size());
     std::string word = text.substr(begin, end - begin);
@@ -363,7 +373,9 @@ std::vector<std::string> faceNamesOf(const CacheReader& cache) {
   }
   std::sort(names.begin(), names.end());
   if (names.size() > 1) names.insert(names.begin(), "all");
-  if (std::any_of(faces->regions().begin(), faces->regions().end(), isWall)) add(names, "walls");
+  if (std::any_of(faces->regions().begin(), faces->regions().end(), isWall) ||
+      !wallsByFlow(cache, *faces).empty())
+    add(names, "walls");
   if (has_blanks) add(names, kBlanks);
   // A comma is taken for the end of a name.
   for (const FaceRegion& region : faces->regions())
