@@ -25,7 +25,17 @@ namespace {
 
 // ------------------------------------------------------------------------------------------- outline
 
-void drawOutline(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+/// Whether the viewer sees a side of the data's box from within: what is on it lies behind the data.
+bool isSeenFromWithin(const AnnotatedScene& scene, int axis, bool upper) {
+  const ScreenView& view = scene.view;
+  if (view.projection != Projection::kPerspective)
+    return upper ? view.forward[axis] > 0 : view.forward[axis] < 0;
+  const double eye = view.eye[axis] / view.scale[axis];
+  return upper ? eye < scene.upper[axis] : eye > scene.lower[axis];
+}
+
+/// Draws the edges of the data's box that lie behind the data, or the others.
+void drawOutline(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink, bool behind) {
   const auto corner = [&](int n) {
     return scene.view.viewFromData({n & 1 ? scene.upper.x : scene.lower.x,
                                     n & 2 ? scene.upper.y : scene.lower.y,
@@ -36,6 +46,10 @@ void drawOutline(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& 
   for (int from = 0; from < 8; ++from)
     for (const int axis : {1, 2, 4}) {
       if (from & axis) continue;
+      bool is_behind = true;
+      for (int other = 0; other < 3; ++other)
+        if (axis != 1 << other) is_behind &= isSeenFromWithin(scene, other, (from & (1 << other)) != 0);
+      if (is_behind != behind) continue;
       const auto line = lineInImage(scene.view, corner(from), corner(from | axis));
       if (!line) continue;
       cairo_move_to(cairo, line->first.x, line->first.y);
@@ -63,30 +77,43 @@ void drawArrow(cairo_t* cairo, const glm::dvec2& from, const glm::dvec2& to, dou
   cairo_fill(cairo);
 }
 
-void drawAxes(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+/// Where the arrow of an axis begins and ends, and where its name stands, in pixels.
+struct AxisArrow {
+  glm::dvec2 from, to, name;
+};
+
+AxisArrow arrowOf(const AnnotatedScene& scene, int axis) {
   const ScreenView& view = scene.view;
   const double font = fontSize(view.size, scene.text_size), length = 3 * font;
   const glm::dvec2 origin(length + 2 * font, view.size.height - length - 2 * font);
+  const glm::dvec2 direction(view.right[axis], view.down[axis]);
+  // The name of an axis along the view goes beside the origin, not on it.
+  const double shown = glm::length(direction);
+  const glm::dvec2 away = shown > 0.2 ? direction / shown : glm::dvec2(-0.7071, 0.7071);
+  const glm::dvec2 end = origin + length * direction;
+  return {origin, end, end + 0.8 * font * away};
+}
+
+void drawAxes(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
+  const double font = fontSize(scene.view.size, scene.text_size);
   struct Axis {
-    glm::dvec3 in_view;  // right, down, forward
+    int number;
+    double depth;
     glm::dvec3 colour;
     const char* name;
   };
   std::array<Axis, 3> axes = {
-      {{{}, {0.84, 0.15, 0.16}, "x"}, {{}, {0.17, 0.55, 0.17}, "y"}, {{}, {0.16, 0.36, 0.85}, "z"}}};
-  for (int n = 0; n < 3; ++n) axes[n].in_view = {view.right[n], view.down[n], view.forward[n]};
+      {{0, 0, {0.84, 0.15, 0.16}, "x"}, {1, 0, {0.17, 0.55, 0.17}, "y"}, {2, 0, {0.16, 0.36, 0.85}, "z"}}};
+  for (Axis& axis : axes) axis.depth = scene.view.forward[axis.number];
   std::sort(axes.begin(), axes.end(),
-            [](const Axis& a, const Axis& b) { return a.in_view.z > b.in_view.z; });  // farthest first
+            [](const Axis& a, const Axis& b) { return a.depth > b.depth; });  // farthest first
   cairo_set_line_width(cairo, std::max(1.5, font / 6));
   for (const Axis& axis : axes) {
-    const glm::dvec2 direction(axis.in_view);
+    const AxisArrow arrow = arrowOf(scene, axis.number);
     setInk(cairo, axis.colour);
-    drawArrow(cairo, origin, origin + length * direction, 0.6 * font);
-    // The name of an axis along the view goes beside the origin, not on it.
-    const double shown = glm::length(direction);
-    const glm::dvec2 away = shown > 0.2 ? direction / shown : glm::dvec2(-0.7071, 0.7071);
+    drawArrow(cairo, arrow.from, arrow.to, 0.6 * font);
     setInk(cairo, ink);
-    drawText(cairo, origin + length * direction + 0.8 * font * away, axis.name);
+    drawText(cairo, arrow.name, axis.name);
   }
 }
 
@@ -233,8 +260,8 @@ void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& in
 
 // -------------------------------------------------------------------------------------- all together
 
-/// `lines`: with the grid's lines, which lie over the data then.
-Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool lines) {
+/// Draws what lies over the data and beside it.
+Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene) {
   Canvas canvas(scene.picture);
   cairo_t* const cairo = canvas.get();
   cairo_set_font_size(cairo, fontSize(scene.picture, scene.text_size));
@@ -242,8 +269,7 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool l
   cairo_save(cairo);  // clips axes and outline to the part that shows the data
   cairo_rectangle(cairo, 0, 0, scene.view.size.width, scene.view.size.height);
   cairo_clip(cairo);
-  if (annotations.outline) drawOutline(cairo, scene, ink);
-  if (annotations.axes_grid && lines) drawAxesGrid(cairo, scene, ink);
+  if (annotations.outline) drawOutline(cairo, scene, ink, false);
   if (annotations.axes_grid) drawAxesLabels(cairo, scene, ink);
   if (annotations.axes) drawAxes(cairo, scene, ink);
   if (annotations.texts) drawTexts(cairo, scene, ink);
@@ -252,23 +278,31 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool l
   return canvas;
 }
 
-/// Puts the background, and the grid's lines on it, behind a picture.
+}  // namespace
+
 void putBehind(Image& picture, const Annotations& annotations, const AnnotatedScene& scene) {
   const glm::vec4 background = scene.background;
   const auto put = [](float* pixel, const glm::vec4& behind) {
     const float through = 1 - pixel[3];
     for (int c = 0; c < 4; ++c) pixel[c] += through * behind[c];
   };
-  if (!annotations.axes_grid) {
+  if (!annotations.lieBehind()) {
     for (size_t n = 0; n < picture.rgba.size(); n += 4) put(&picture.rgba[n], background);
     return;
   }
   Canvas canvas(picture.size);
-  drawAxesGrid(canvas.get(), scene, inkFor(background));
+  const glm::dvec3 ink = inkFor(background);
+  cairo_t* const cairo = canvas.get();
+  cairo_rectangle(cairo, 0, 0, scene.view.size.width, scene.view.size.height);
+  cairo_clip(cairo);
+  if (annotations.axes_grid) drawAxesGrid(cairo, scene, ink);
+  if (annotations.outline) drawOutline(cairo, scene, ink, true);
   canvas.forEachPixel<true>([&](int x, int y, const glm::vec4& over) {
     put(picture.pixel(x, y), over + (1 - over.a) * background);
   });
 }
+
+namespace {
 
 /// The data with clear pixels at their right. Pages of what has been copied go back to the system at once: two large pictures would
 /// need the memory twice.
@@ -294,6 +328,10 @@ Image widened(Image data, ImageSize size) {
 }
 
 }  // namespace
+
+std::array<glm::dvec2, 3> axisNames(const AnnotatedScene& scene) {
+  return {arrowOf(scene, 0).name, arrowOf(scene, 1).name, arrowOf(scene, 2).name};
+}
 
 ImageSize dataSize(const Annotations& annotations, ImageSize picture,
                    std::span<const ShownFunction> functions) {
@@ -321,9 +359,9 @@ Image annotated(Image data, const Annotations& annotations, const AnnotatedScene
   } else {
     picture = std::move(data);
   }
-  if (annotations.axes_grid || is_narrower) putBehind(picture, annotations, scene);
+  if (annotations.lieBehind() || is_narrower) putBehind(picture, annotations, scene);
   if (!(annotations == Annotations{}))
-    drawn(annotations, scene, false).forEachPixel([&](int x, int y, const glm::vec4& over) {
+    drawn(annotations, scene).forEachPixel([&](int x, int y, const glm::vec4& over) {
       float* const pixel = picture.pixel(x, y);
       for (int c = 0; c < 4; ++c) pixel[c] = over[c] + (1 - over.a) * pixel[c];
     });
@@ -339,7 +377,7 @@ std::vector<uint8_t> annotationLayer(const Annotations& annotations, const Annot
   const size_t width = static_cast<size_t>(scene.picture.width);
   std::vector<uint8_t> layer(4 * width * static_cast<size_t>(scene.picture.height), 0);
   if (annotations == Annotations{}) return layer;
-  drawn(annotations, scene, true).forEachPixel([&](int x, int y, const glm::vec4& over) {
+  drawn(annotations, scene).forEachPixel([&](int x, int y, const glm::vec4& over) {
     uint8_t* const pixel = &layer[4 * (static_cast<size_t>(y) * width + static_cast<size_t>(x))];
     for (int c = 0; c < 3; ++c)
       pixel[c] = static_cast<uint8_t>(std::min(over[c] / over.a, 1.0f) * 255 + 0.5f);

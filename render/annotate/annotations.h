@@ -6,7 +6,9 @@
 // UsageError.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,9 +24,12 @@ struct Annotations {
   bool scalar_bar = false;
   bool axes = false;
   bool outline = false;
-  bool axes_grid = false;  // its lines lie behind the data if that is over a transparent background
-  bool texts = false;      // the scene's title and label
-  double text_size = 0;    // of the font, in pixels; 0: by the picture's height
+  bool axes_grid = false;
+  bool texts = false;    // the scene's title and label
+  double text_size = 0;  // of the font, in pixels; 0: by the picture's height
+
+  /// Whether lines of them lie behind the data, which then has to be drawn over a transparent background.
+  bool lieBehind() const { return axes_grid || outline; }
   bool operator==(const Annotations&) const = default;
 };
 
@@ -36,17 +41,24 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture,
 /// The size with one bar, of colours and opacities.
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function);
 
+/// Returns where the names of x, y and z stand at the ends of the axes' arrows, in pixels of the picture.
+std::array<glm::dvec2, 3> axisNames(const AnnotatedScene& scene);
+
 /// The whole picture: `data`, which has the size of scene.view, over the background where it is transparent,
 /// and the annotations. Without a text size it follows the picture's height. Takes the memory of `data` if it is as
 /// large as the picture, and frees it otherwise. Throws Error if the picture is larger than Cairo supports
 /// (32,767 pixels a side).
 Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& scene);
 
+/// Puts behind a picture, where it is transparent, the background and on it what lies behind the data: lines of the axes
+/// grid, and the outline's edges on the far side. annotated() does it, too.
+void putBehind(Image& picture, const Annotations& annotations, const AnnotatedScene& scene);
+
 /// Memory that annotated() needs beside that of `data`, of this size, which it gives back meanwhile. Its result
 /// is included.
 uint64_t annotatedBytes(ImageSize picture, ImageSize data);
 
-/// The annotations alone, for the whole picture: four bytes a pixel (red, green, blue, alpha; not
+/// The annotations alone that lie over the data and beside it, for the whole picture: four bytes a pixel (red, green, blue, alpha; not
 /// premultiplied). Throws as annotated() does.
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene);
 

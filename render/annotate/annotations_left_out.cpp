@@ -25,9 +25,17 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture, const Tran
   return picture;
 }
 
+std::array<glm::dvec2, 3> axisNames(const AnnotatedScene& /*scene*/) {
+  return {};
+}
+
 Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& /*scene*/) {
   refuse(annotations);
   return data;
+}
+
+void putBehind(Image& /*picture*/, const Annotations& annotations, const AnnotatedScene& /*scene*/) {
+  refuse(annotations);
 }
 
 uint64_t annotatedBytes(ImageSize /*picture*/, ImageSize /*data*/) {

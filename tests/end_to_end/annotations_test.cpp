@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -40,6 +42,47 @@ TEST_F(Annotations, EachIsDrawnInItsPlace) {
   EXPECT_EQ(changed(plain, axes, 0, 80, 0, 80), 0);
   const Image outline = render({"--outline"});
   EXPECT_GT(changed(plain, outline, 0, 200, 0, 160), 300);
+}
+
+/// A filled box shows nine edges in parallel projection; each direction has four of one length.
+TEST_F(Annotations, OpaqueDataHidesTheOutlinesFarEdges) {
+  std::ofstream grid(file("box.vtk"));
+  grid << "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET STRUCTURED_GRID\nDIMENSIONS 12 9 7\nPOINTS 756 "
+          "float\n";
+  for (int n = 0; n < 756; ++n) grid << n % 12 << ' ' << n / 12 % 9 << ' ' << n / 108 << '\n';
+  grid << "POINT_DATA 756\nSCALARS f float\nLOOKUP_TABLE default\n";
+  for (int n = 0; n < 756; ++n) grid << n % 12 << '\n';
+  grid.close();
+  run({"convert", file("box.vtk"), "-o", file("box.splats"), "--refine", "1"});
+  // The data are black, and the lines light.
+  const auto inked = [&](const Words& opacity) {
+    const Words look{"--tf",
+                     "grey",
+                     "--range",
+                     "20,30",
+                     "--background",
+                     "#0000ff",
+                     "--position",
+                     "30,-18,14",
+                     "--focal-point",
+                     "5.5,4,3",
+                     "--view-up",
+                     "0,0,1",
+                     "--parallel-scale",
+                     "9"};
+    const auto picture = [&](const Words& more) {
+      return pictureOf(file("box.splats"), file("box.exr"), look + opacity + more, "400x320");
+    };
+    const Image plain = picture({}), outline = picture({"--outline"});
+    int count = 0;
+    for (size_t n = 0; n < plain.rgba.size(); n += 4)
+      count += std::abs(plain.rgba[n] - outline.rgba[n]) > 0.1f;
+    return count;
+  };
+  const int all = inked({"--opacity", "0:0.0001,1:0.0001"});
+  const int seen = inked({"--opacity", "0:1,1:1", "--opacity-unit", "0.01"});
+  EXPECT_GT(all, 500);
+  EXPECT_NEAR(static_cast<double>(seen) / all, 0.75, 0.08);
 }
 
 TEST_F(Annotations, TheScalarBarStandsBesideTheData) {

@@ -192,7 +192,7 @@ void render(const RenderArguments& given) {
   options.size = dataSize(arguments.annotations.shown, picture, functions);
   options.output_bytes = outputBytes(arguments, picture, options.size);
   const bool has_grid = arguments.annotations.shown.axes_grid;
-  const bool has_box = has_grid || arguments.annotations.shown.outline;
+  const bool has_box = arguments.annotations.shown.lieBehind();
   const Series series = cache.series();
   const auto box_on_globe = has_grid ? boxOnGlobe(cache, globe) : std::nullopt;
   const ShownBox box =
@@ -232,8 +232,8 @@ void render(const RenderArguments& given) {
                       scalars.colour ? &manifest.variables[shown] : nullptr,
                       functions,
                       options.background};
-  // The grid lies behind the data, before the background.
-  if (has_grid) options.background = glm::vec4(0);
+  // The grid and edges of the box lie behind the data, before the background.
+  if (has_box) options.background = glm::vec4(0);
   const auto writeReport = [&] {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));

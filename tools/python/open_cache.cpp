@@ -297,12 +297,12 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     const auto box_on_globe = annotations.axes_grid ? boxOnGlobe(reader_, globe) : std::nullopt;
     const ShownBox box =
         withGrid(shownBox(manifest, frame.scale, frame.clip_box, annotations), box_on_globe, frame.scale);
-    const bool whole = annotations.outline || annotations.axes_grid || frame.clip_box;
+    const bool whole = annotations.lieBehind() || frame.clip_box;
     const CameraArguments camera = choice.picture.camera(placedAbove(arguments.camera, globe, frame.scale),
                                                          function, {box, frame.size, whole});
     const Camera at = chooseCameraMotion(camera, box, frame.size).camera(0);
-    // The grid of the axes lies behind the data, before the background.
-    if (annotations.axes_grid) frame.background = glm::vec4(0);
+    // The grid of the axes and edges of the box lie behind the data, before the background.
+    if (annotations.lieBehind()) frame.background = glm::vec4(0);
     FrameRenderer& renderer = rendererOf(scalars, arguments.backend);
     image = arguments.channels.any()
                 ? renderer.renderWithValues(at, frame, picture.statistics, values, &of_work)

@@ -362,7 +362,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     scene->volume = volume;
     options.scene = std::move(scene);
   }
-  options.background = background();
+  options.background = annotations.lieBehind() ? glm::vec4(0) : background();
   options.memory_bytes = memory_bytes;
   return options;
 }

@@ -209,6 +209,11 @@ void CacheView::takeFrame() {
   }
   if (!frame) return;
   reports_.settle(About::kPicture);
+  if (frame->options.background.a < 1) {  // as frameOptions() has it for what lies behind the data
+    const ShownFunctions functions(state_, manifest());
+    putBehind(frame->image, state_.annotations, sceneOf(state_, functions, *frame, frame->image.size));
+    frame->bytes = bytesOf(frame->image);
+  }
   picture_.set(frame->bytes, frame->image.size);
   window_.redraw();
   shown_ = std::move(frame);
