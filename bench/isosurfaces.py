@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Isosurfaces against VTK's contour of the same grid.
 
-    bench/isosurfaces.py FOLDER [--curvisplat PROGRAM] [--grids GRIDS] [--only NAME] [--voxels 256 | --source]
+    bench/isosurfaces.py FOLDER [--curvisplat PROGRAM] [--grids GRIDS] [--only NAME] [--voxels 256 | --source | --drawn]
 
 Grids: the blunt fin, the delta wing and the combustor of GRIDS (../shared/data beside the project; what is missing is
 left out, and said so), and a generated wake. VTK computes q_criterion, the magnitude of the vorticity and that of the
@@ -9,6 +9,9 @@ pressure's gradient at their nodes; both programs then get the same .vts file. O
 95 % of the nodes are below are contoured. Half a cell is half of what the contour's cell measures along its normal.
 
 --source: ours are contours of the grid's own cells, not of a lattice of voxels.
+
+--drawn: what `render --iso` draws beside VTK's contour drawn by `render --surface`, from four views of 700x500 pixels.
+Prints the least share of the pixels of either that both cover, and that of each view.
 
 Prints, for each: the share of VTK's surface within half a cell of ours and of ours within half a cell of VTK's, by area,
 the 99 % distance in cells, triangles, and the processor time of both. Needs VTK for Python.
@@ -193,6 +196,7 @@ def main():
     parser.add_argument("--only")
     parser.add_argument("--voxels", default="256")
     parser.add_argument("--source", action="store_true")
+    parser.add_argument("--drawn", action="store_true")
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     grids = {
@@ -201,8 +205,9 @@ def main():
         "combustor": lambda: plot3d(arguments.grids / "combustor/combxyz.bin", arguments.grids / "combustor/combq.bin"),
         "wake": lambda: wake(arguments.curvisplat, arguments.folder),
     }
-    print(f"{'grid':<10}{'scalar':<28}{'value':>10}{'VTK near ours':>15}{'ours near VTK':>15}{'99 % cells':>16}"
-          f"{'triangles':>18}{'VTK s':>8}{'ours s':>8}")
+    if not arguments.drawn:
+        print(f"{'grid':<10}{'scalar':<28}{'value':>10}{'VTK near ours':>15}{'ours near VTK':>15}{'99 % cells':>16}"
+              f"{'triangles':>18}{'VTK s':>8}{'ours s':>8}")
     for name, read in grids.items():
         if arguments.only and arguments.only != name:
             continue
@@ -222,7 +227,37 @@ def main():
         for scalar in scalars:
             values = vtk_to_numpy(grid.GetPointData().GetArray(scalar))
             for percent in (60, 80, 95):
-                compare(arguments, grid, cache, name, scalar, float(np.percentile(values, percent)))
+                value = float(np.percentile(values, percent))
+                (compare_drawn if arguments.drawn else compare)(arguments, grid, cache, name, scalar, value)
+
+
+def covered(arguments, cache, scalar, view, what):
+    """Which pixels a surface covers."""
+    picture = arguments.folder / "drawn.png"
+    subprocess.run([arguments.curvisplat, "render", cache, "--scalar", scalar, *what, "--volume", "off", "--view", view,
+                    "--size", "700x500", "--background", "transparent", "-o", picture],
+                   check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    reader = vtk.vtkPNGReader()
+    reader.SetFileName(str(picture))
+    reader.Update()
+    return vtk_to_numpy(reader.GetOutput().GetPointData().GetScalars())[:, 3] > 127
+
+
+def compare_drawn(arguments, grid, cache, name, scalar, value):
+    writer = vtk.vtkSTLWriter()
+    triangles = vtk.vtkTriangleFilter()
+    triangles.SetInputData(contour(grid, scalar, value)[0])
+    writer.SetInputConnection(triangles.GetOutputPort())
+    writer.SetFileTypeToBinary()
+    writer.SetFileName(str(arguments.folder / "vtk.stl"))
+    writer.Write()
+    shares = []
+    for view in ("iso", "+x", "+y", "+z"):
+        ours = covered(arguments, cache, scalar, view, [f"--iso={value:.9g}"])
+        theirs = covered(arguments, cache, scalar, view, ["--surface", arguments.folder / "vtk.stl"])
+        shares.append((ours & theirs).sum() / max(1, (ours | theirs).sum()))
+    print(f"{name:<10}{scalar:<28}{value:>10.4g}  least {100 * min(shares):.2f} %, " +
+          ", ".join(f"{100 * share:.2f}" for share in shares), flush=True)
 
 
 def compare(arguments, grid, cache, name, scalar, value):

@@ -117,7 +117,7 @@ HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t la
   return {lo, hn::Max(hi, lo)};
 }
 
-/// What the faces leave of a splat in a block: kSome where that is not known.
+/// Says what the faces leave of a splat in a block; kSome where that is not known.
 enum class Left { kNothing, kSome, kAll };
 
 /// Most blocks of a large splat lie wholly on one side of each face.
