@@ -79,7 +79,7 @@ TEST_F(Annotations, OpaqueDataHidesTheOutlinesFarEdges) {
       count += std::abs(plain.rgba[n] - outline.rgba[n]) > 0.1f;
     return count;
   };
-  const int all = inked({"--opacity", "0:0.0001,1:0.0001"});
+  const int all = inked({"--opacity", "0:0.0001,1:0.0001", "--opacity-unit", "1000"});
   const int seen = inked({"--opacity", "0:1,1:1", "--opacity-unit", "0.01"});
   EXPECT_GT(all, 500);
   EXPECT_NEAR(static_cast<double>(seen) / all, 0.75, 0.08);
