@@ -64,6 +64,23 @@ TEST_F(WindowStart, TheDialogOpensAZarrStore) {
   close();
 }
 
+/// The grid alone is not enough; with its solution what was said goes away.
+TEST_F(WindowStart, ALoneGridAsksForItsSolution) {
+  fs::remove_all("both");
+  fs::create_directory("both");
+  for (const char* name : {"a.xyz", "a.fun", "a.nam"}) fs::copy_file(name, fs::path("both") / name);
+  openEmpty();
+  click("open");
+  answer("both/a.xyz");
+  const auto says = [] { return hasWidget("message a.xyz: has no values"); };
+  EXPECT_TRUE(eventually(says, 60));
+  click("open");
+  answer("both/a.xyz both/a.fun");
+  EXPECT_TRUE(eventually([] { return hasWidget("scalar shown: f"); }, 60));
+  EXPECT_TRUE(eventually([&] { return !says(); }));
+  close();
+}
+
 TEST_F(WindowStart, AnExampleIsShownWithoutAFile) {
   openEmpty();
   click("example");

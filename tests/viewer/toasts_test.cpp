@@ -35,6 +35,21 @@ TEST(Toasts, TheSameTextIsOne) {
   EXPECT_TRUE(toasts.shown(3).empty());
 }
 
+/// Errors name options of the command line, which the window does not have.
+TEST(Reports, SayWhereTheOptionsAre) {
+  const std::string where =
+      " (an option of \"curvisplat convert\" in a terminal; open the cache that it writes)";
+  const std::string blank = "give it to --blank; otherwise scale the values";
+  EXPECT_EQ(inWindowsWords(blank), blank + where);
+  const std::string iblank = "read it without iblank (--iblank no)";
+  EXPECT_EQ(inWindowsWords(iblank), iblank + where);
+  const std::string backend = "no memory is left; give --backend cpu";
+  EXPECT_EQ(inWindowsWords(backend), backend + " (an option of \"curvisplat view\" in a terminal)");
+  EXPECT_EQ(inWindowsWords("ask for a smaller --size"), "ask for a smaller size");
+  for (const char* plain : {"a.xyz: is truncated", "wing--fine.cgns: cannot be read", "a -- b", "--"})
+    EXPECT_EQ(inWindowsWords(plain), plain);
+}
+
 TEST(Toasts, TheSameTextIsNewAgainOnceItHasGone) {
   Toasts toasts;
   EXPECT_TRUE(toasts.add("saved", 0));

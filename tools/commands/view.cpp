@@ -25,6 +25,7 @@
 #include "tools/options/further_scalars.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/kept_caches.h"
+#include "tools/options/kept_conversion.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/point_values.h"
 #include "tools/options/scene_arguments.h"
@@ -108,7 +109,14 @@ ConversionServices conversionServices(ValuePrecision precision) {
     kept.preview = [&](const KeptPreview& preview) {
       events.preview({preview.cache, preview.whole, whatOf(preview), preview.folder});
     };
-    return keptCacheOf(files, progress, kept, {}, precision);
+    try {
+      return keptCacheOf(files, progress, kept, {}, precision);
+    } catch (const LoneGrid&) {
+      if (files.size() > 1) throw;
+      throw Error(
+          "{}: has no values, only coordinates: choose the solution, too (Ctrl + click takes several files)",
+          files.front().filename().string());
+    }
   };
   services.sources_of = sourcesOf;
   services.further_scalars = [](const std::filesystem::path& cache, const Paths& files) {

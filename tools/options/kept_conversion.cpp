@@ -201,6 +201,15 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   folder->keep();
 }
 
+std::vector<uint32_t> scalarsOf(const ConvertArguments& arguments, const GridDescription& description) {
+  try {
+    return chooseScalars(arguments, {}, description);
+  } catch (const Error& error) {
+    if (std::ranges::all_of(description.scalars, &GridScalar::derived)) throw LoneGrid("{}", error.what());
+    throw;
+  }
+}
+
 }  // namespace
 
 void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, Progress& progress,
@@ -215,7 +224,7 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   const auto source = openSource(arguments, output);
   ConvertOptions options = optionsFor(output, files.front().stem().string());
   options.precision = precision;
-  options.scalars = chooseScalars(arguments, {}, source->description());
+  options.scalars = scalarsOf(arguments, source->description());
   makePreview(*source, options, false, progress, events);
   sayAll(events, source->description(), convert(*source, options, progress));
 }

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/codec/values_codec.h"
 
@@ -57,6 +58,12 @@ struct KeptCacheEvents {
   std::function<void(const KeptPreview&)> preview = {};                     // empty: none is made
 };
 
+/// The files hold a grid alone, and no scalar but those that can be computed from its coordinates.
+class LoneGrid : public Error {
+ public:
+  using Error::Error;
+};
+
 /// Grids with more nodes or cells than this get a preview of about a quarter of this number, which takes a
 /// second at most.
 inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
@@ -64,7 +71,7 @@ inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
 /// Converts the grid or the series of time steps in `files` to `output`, which is complete or does not
 /// exist. Previews and scratch files are in the same folder; a preview stays while it is held. A series
 /// stays in the folder of its preview, and `output` links to it. Previews of a series show its first step: a
-/// coarse one if the step is large, then the step as converted. Throws Error as opening and converting do,
+/// coarse one if the step is large, then the step as converted. Throws Error as opening and converting do, LoneGrid,
 /// Interrupted once `progress` is stopped.
 void makeKeptCache(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output,
                    Progress& progress, const KeptCacheEvents& events,

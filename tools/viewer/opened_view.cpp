@@ -182,7 +182,7 @@ void OpenedView::update() {
 
 void OpenedView::takeOpened() {
   if (!opening_) return;
-  for (const std::string& text : opening_->takeMessages()) surroundings_.reports.say(text);
+  for (const std::string& text : opening_->takeMessages()) surroundings_.reports.say(inWindowsWords(text));
   const bool is_done = opening_->isDone();
   if (auto preview = opening_->takePreview(); preview && !is_done) showPreview(*preview);
   if (is_done) takeWhole();

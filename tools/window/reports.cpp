@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <new>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -25,7 +26,29 @@ std::string textOf(const TooLittleMemory& error) {
   return fmt::format("this picture needs more memory: {}, or \"error, pixels\"", kWhere);
 }
 
+/// Whether an option such as --blank stands at a place of a text.
+bool isOptionAt(const std::string& text, size_t at) {
+  const bool begins = at == 0 || text[at - 1] == ' ' || text[at - 1] == '(';
+  return begins && at + 2 < text.size() && text.compare(at, 2, "--") == 0 && text[at + 2] >= 'a' &&
+         text[at + 2] <= 'z';
+}
+
 }  // namespace
+
+std::string inWindowsWords(const std::string& message) {
+  constexpr std::string_view kSize = "--size";  // a field of the dialog
+  std::string text = message;
+  if (const size_t at = text.find(kSize); at != text.npos) text.replace(at, kSize.size(), "size");
+  for (size_t at = text.find("--"); at != text.npos; at = text.find("--", at + 2)) {
+    if (!isOptionAt(text, at)) continue;
+    const bool of_drawing = text.compare(at, 9, "--backend") == 0 || text.compare(at, 6, "--card") == 0;
+    return text +
+           (of_drawing
+                ? " (an option of \"curvisplat view\" in a terminal)"
+                : " (an option of \"curvisplat convert\" in a terminal; open the cache that it writes)");
+  }
+  return text;
+}
 
 bool Toasts::add(const std::string& text, double now_s, bool is_error, About about) {
   const double ends_s =
@@ -78,7 +101,7 @@ void Reports::report(const std::exception& error, About about) {
                   about);
   if (const auto* const too_little = dynamic_cast<const TooLittleMemory*>(&error))
     return report(textOf(*too_little), about);
-  report(oneLine(error.what()), about);
+  report(inWindowsWords(oneLine(error.what())), about);
 }
 
 void Reports::report(const std::string& text, About about) {

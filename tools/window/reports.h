@@ -44,6 +44,9 @@ class Toasts {
   std::deque<std::string> log_;
 };
 
+/// A message as the window shows it: says where the options are that it names, since the window has none.
+std::string inWindowsWords(const std::string& message);
+
 /// Shows and prints errors and messages.
 class Reports {
  public:
