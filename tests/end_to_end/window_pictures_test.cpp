@@ -3,6 +3,7 @@
 // people to look at, too.
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <functional>
 
 #include "render/colour/function_parts.h"
@@ -204,6 +205,27 @@ TEST_F(WindowMovie, OnceAroundIsWhatRenderDraws) {
   for (const char* const part : {"1/30", "30/30"}) draw(command, {"--part", part});  // every 30th
   for (const int frame : {0, 30, 89}) expectSame(frame);
   EXPECT_LT(difference(readImage("movie/m_0000.png"), readImage("movie/m_0030.png")), 40);
+}
+
+/// A page is offered where ffmpeg is not in PATH: it needs none.
+TEST_F(WindowMovie, WithoutFfmpegAPageIsOffered) {
+  const std::string path = std::getenv("PATH");
+  fs::remove("a.html");
+  fs::remove_all("bin");
+  fs::create_directory("bin");
+  std::istringstream folders(path);
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (const fs::path tool = fs::path(folder) / "xdotool"; fs::exists(tool) && !fs::exists("bin/xdotool"))
+      fs::create_symlink(tool, "bin/xdotool");
+  setenv("PATH", file("bin").c_str(), 1);
+  open({"--scalar", "volume"}, {480, 360});
+  setenv("PATH", path.c_str(), 1);
+  choose("File", "Save movie: once around...");
+  placeOf("file name");
+  press("Return");
+  EXPECT_TRUE(isSaved());
+  EXPECT_TRUE(fs::exists("a.html"));
+  close();
 }
 
 TEST_F(WindowMovie, AllTimeStepsAreItsFrames) {

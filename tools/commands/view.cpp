@@ -148,6 +148,7 @@ void view(const ViewArguments& arguments) {
   const ValuePrecision precision = parseValuePrecision("--value-precision", arguments.value_precision);
   options.conversion = conversionServices(precision);
   options.faces = faceServices();
+  options.encodes_movies = hasMovieEncoder();
   options.open_movie = [](const std::filesystem::path& file, ImageSize size, double frames_per_s) {
     return std::make_unique<MovieFile>(file, size, frames_per_s);
   };

@@ -14,7 +14,10 @@
 #include <cerrno>
 #include <charconv>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <sstream>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -89,6 +92,15 @@ bool isMovieName(const std::filesystem::path& path) {
 
 bool isGifName(const std::filesystem::path& path) {
   return extensionOf(path) == ".gif";
+}
+
+bool hasMovieEncoder() {
+  const char* const path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (access((std::filesystem::path(folder.empty() ? "." : folder) / "ffmpeg").c_str(), X_OK) == 0)
+      return true;
+  return false;
 }
 
 MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s)

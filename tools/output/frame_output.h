@@ -21,6 +21,8 @@ namespace curvisplat {
 /// Whether the name ends in .mp4, .gif or .html, in letters of any case: one file of all frames.
 bool isMovieName(const std::filesystem::path& path);
 bool isGifName(const std::filesystem::path& path);
+/// Whether ffmpeg is in PATH, which .mp4 and .gif need.
+bool hasMovieEncoder();
 
 /// A movie that ffmpeg encodes. Unless finish() was called, the destructor ends ffmpeg and removes the
 /// unfinished movie.

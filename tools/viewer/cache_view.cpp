@@ -84,6 +84,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       overlay_(window.gl()),
       views_(savedViewsOf(whole())),
       further_(options.conversion, cache_.wholePath(), sourcesFor(cache_, options), Window::wake),
+      encodes_movies_(options.encodes_movies),
       probe_(cache_),
       chooser_(cache_, Window::wake) {
   frames_.emplace(cache_, backend_, Window::wake, std::move(after));

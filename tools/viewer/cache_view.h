@@ -213,6 +213,7 @@ class CacheView {
   FurtherScalarList further_;
   bool adds_scalar_ = false;  // one is being added
   std::optional<WantedScalar> wanted_scalar_;
+  const bool encodes_movies_;
   MovieKind movie_kind_ = MovieKind::kOneTurn;  // for which a file is being chosen
   std::optional<MovieRequest> wanted_movie_;
 

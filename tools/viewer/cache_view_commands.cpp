@@ -171,12 +171,13 @@ void CacheView::takeIsosurfaces() {
 void CacheView::saveMovieOf(MovieKind kind) {
   movie_kind_ = kind;
   const MovieRequest movie = newMovie({});
-  FileDialog::MovieOffer offer{movie.size, movie.frames_per_s, {}};
+  FileDialog::MovieOffer offer{movie.size, movie.frames_per_s, {}, encodes_movies_};
   // The dialog may outlive this view.
   offer.frames = [film = film_, frames = framesOf(movie), kind](double rate) {
     return kind == MovieKind::kFilm ? film.frames(rate) : frames;
   };
-  dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ".mp4", std::move(offer));
+  const char* const ending = encodes_movies_ ? ".mp4" : ".html";
+  dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ending, std::move(offer));
 }
 
 void CacheView::moveCamera(Command command) {

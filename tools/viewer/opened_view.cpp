@@ -170,6 +170,7 @@ ViewerOptions OpenedView::viewOptions() const {
   options.memory_bytes = options_.memory_bytes;
   options.conversion = options_.conversion;
   options.faces = options_.faces;
+  options.encodes_movies = options_.encodes_movies;
   return options;
 }
 

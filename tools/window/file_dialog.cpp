@@ -58,7 +58,7 @@ Look lookOf(FileDialog::Purpose purpose) {
     case FileDialog::Purpose::kSaveFilm:
       return {"Save film", "save", true, {".json"}};
     case FileDialog::Purpose::kSaveMovie:
-      return {"Save movie", "save", true, {".mp4", ".gif", ".png"}};
+      return {"Save movie", "save", true, {".mp4", ".gif", ".html", ".png"}};
   }
   return {"", ""};
 }
@@ -199,7 +199,10 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   if (error_.empty() && *purpose_ == Purpose::kOpenData)
     ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
   else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
-    ImGui::TextDisabled(".mp4 or .gif; .png: a numbered picture of each frame");
+    ImGui::TextDisabled("%s",
+                        movie_.has_encoder
+                            ? ".mp4 or .gif; .html: a page that plays it; .png: numbered pictures"
+                            : ".html: a page that plays it; .png: numbered pictures; .mp4, .gif need ffmpeg");
   else
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
@@ -368,7 +371,8 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
   Chosen chosen{*purpose_, {}};
   if (look.saves) {
     fs::path path = whole(name_);
-    if (path.extension().empty()) path += look.endings.front();
+    const bool lacks_encoder = *purpose_ == Purpose::kSaveMovie && !movie_.has_encoder;
+    if (path.extension().empty()) path += lacks_encoder ? ".html" : look.endings.front();
     // The second time it is meant.
     if (fs::exists(path, ignored) && overwrites_ != path.string()) {
       overwrites_ = path.string();

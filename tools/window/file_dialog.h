@@ -55,6 +55,7 @@ class FileDialog {
     ImageSize size{0, 0};
     double frames_per_s = 25;
     std::function<uint64_t(double frames_per_s)> frames = {};  // how many pictures it has at that rate
+    bool has_encoder = true;                                   // ffmpeg, which .mp4 and .gif need
   };
 
   /// `is_grid_folder` may be empty: no folder is. `data_folder`: where data were opened last; may be empty.
