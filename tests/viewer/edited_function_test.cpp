@@ -51,6 +51,26 @@ TEST(EditedFunction, ADefinitionComesBackTheSame) {
   expectSame(edited.function(), again.function(), 0.1, 1000);
 }
 
+/// A band keeps its form, and ends where its first point would leave the range.
+TEST(EditedFunction, InnerPointsAreMovedTogether) {
+  EditedFunction edited("grey", 0, 1, 1);
+  edited.setOpacities({{0, 0}, {0.4, 0}, {0.5, 0.5}, {0.6, 0}, {1, 0}});
+  const auto expectAt = [&](const std::vector<double>& places) {
+    ASSERT_EQ(edited.points().size(), places.size());
+    for (size_t n = 0; n < places.size(); ++n) EXPECT_NEAR(edited.points()[n].x, places[n], 1e-12) << n;
+    EXPECT_EQ(edited.points()[2].opacity, 0.5);
+  };
+  edited.movePointsTogether(0.25);
+  expectAt({0, 0.65, 0.75, 0.85, 1});
+  edited.movePointsTogether(0.25);
+  expectAt({0, 0.8, 0.9, 1, 1});
+  edited.movePointsTogether(-3);
+  expectAt({0, 0, 0.1, 0.2, 1});
+  edited.setOpacities({{0, 0}, {1, 1}});
+  edited.movePointsTogether(0.5);
+  EXPECT_EQ(edited.points().back().x, 1);
+}
+
 TEST(EditedFunction, OpacitiesNarrowerThanTheColoursKeepTheirPlaces) {
   TransferFunctionDefinition definition = presetDefinition("grey");
   definition.colours = {{0, glm::dvec3(0)}, {10, glm::dvec3(1)}};

@@ -68,7 +68,7 @@ void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelAc
   ImGui::BeginDisabled(!has_keys);
   commandButton(Command::kSaveFilmMovie, actions, "movie...");
   ImGui::SameLine();
-  commandButton(Command::kCopyFilmCommand, actions, "copy command");
+  commandButton(Command::kCopyFilmCommand, actions, "copy film's command");
   ImGui::EndDisabled();
   if (has_keys) {
     drawPictures(film, pictures, does);

@@ -20,6 +20,20 @@ ImU32 toImGui(const glm::dvec3& rgb) {
       {static_cast<float>(rgb.x), static_cast<float>(rgb.y), static_cast<float>(rgb.z), 1});
 }
 
+/// The colours of a plot: on white paper in the light theme.
+struct PlotColours {
+  ImU32 paper, bars, line, grid, edge;  // `edge`: around points
+};
+
+PlotColours plotColours() {
+  const bool is_light = ImGui::GetStyleColorVec4(ImGuiCol_Text).x < 0.5f;
+  if (is_light)
+    return {IM_COL32(255, 255, 255, 255), IM_COL32(176, 184, 198, 255), IM_COL32(25, 25, 28, 255),
+            IM_COL32(0, 0, 0, 30), IM_COL32(25, 25, 28, 255)};
+  return {IM_COL32(30, 30, 34, 255), IM_COL32(96, 104, 120, 255), IM_COL32(250, 250, 250, 255),
+          IM_COL32(255, 255, 255, 28), IM_COL32(255, 255, 255, 255)};
+}
+
 }  // namespace
 
 float heightOf(double opacity) {
@@ -32,24 +46,24 @@ double opacityAt(float height) {
 void paintHistogram(const std::vector<double>& histogram, const CurveCanvas& canvas) {
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const ImVec2 end(canvas.lower.x + canvas.size.x, canvas.lower.y + canvas.size.y);
-  list->AddRectFilled(canvas.lower, end, IM_COL32(30, 30, 34, 255));
+  const PlotColours colours = plotColours();
+  list->AddRectFilled(canvas.lower, end, colours.paper);
   const double most = histogram.empty() ? 0 : *std::max_element(histogram.begin(), histogram.end());
   for (size_t n = 0; most > 0 && n < histogram.size(); ++n) {
     const double part = std::clamp(1 + std::log10(std::max(histogram[n] / most, 1e-9)) / 4, 0.0, 1.0);
     const double x = static_cast<double>(n) / static_cast<double>(histogram.size());
     list->AddRectFilled(canvas.at(x, static_cast<float>(part)),
-                        canvas.at(x + 1.0 / static_cast<double>(histogram.size()), 0),
-                        IM_COL32(96, 104, 120, 255));
+                        canvas.at(x + 1.0 / static_cast<double>(histogram.size()), 0), colours.bars);
   }
 }
 
 void paintLine(const CurveCanvas& canvas, const std::function<float(double)>& height) {
+  const ImU32 colour = plotColours().line;
   ImVec2 before = canvas.at(0, height(0));
   for (float x = 1; x <= canvas.size.x; ++x) {
     const double part = x / canvas.size.x;
     const ImVec2 now = canvas.at(part, height(part));
-    ImGui::GetWindowDrawList()->AddLine(before, now, IM_COL32(250, 250, 250, 255),
-                                        0.11f * ImGui::GetFontSize());
+    ImGui::GetWindowDrawList()->AddLine(before, now, colour, 0.11f * ImGui::GetFontSize());
     before = now;
   }
 }
@@ -73,7 +87,7 @@ void paintCurve(const EditedFunction& function, const std::vector<double>& histo
   for (const OpacityPoint& point : function.points()) {
     const ImVec2 at = canvas.at(point.x, heightOf(point.opacity));
     list->AddCircleFilled(at, kPointRadius * unit, toImGui(function.colourAt(point.x)));
-    list->AddCircle(at, kPointRadius * unit, IM_COL32(255, 255, 255, 255), 0, 0.08f * unit);
+    list->AddCircle(at, kPointRadius * unit, plotColours().edge, 0, 0.08f * unit);
   }
 }
 
@@ -130,7 +144,7 @@ void paintHeights(const CurveCanvas& canvas) {
   for (const double opacity : kHeights) {
     const ImVec2 at = canvas.at(0, heightOf(opacity));
     ImDrawList* const list = ImGui::GetWindowDrawList();
-    list->AddLine(at, {at.x + canvas.size.x, at.y}, IM_COL32(255, 255, 255, 28));
+    list->AddLine(at, {at.x + canvas.size.x, at.y}, plotColours().grid);
     const std::string text = fmt::format("{:g}", opacity);
     const float y = std::clamp(at.y - down, canvas.lower.y, canvas.lower.y + canvas.size.y - 2 * down);
     list->AddText({at.x - away - ImGui::CalcTextSize(text.c_str()).x, y},

@@ -143,14 +143,18 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
   if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragged_.reset();
   const bool mouse_moved = ImGui::GetIO().MouseDelta.x != 0 || ImGui::GetIO().MouseDelta.y != 0;
   if (dragged_ && mouse_moved) {
-    function.movePoint(*dragged_, canvas.xOf(mouse), opacityAt(canvas.heightAt(mouse)));
+    if (ImGui::GetIO().KeyShift)
+      function.movePointsTogether(canvas.xOf(mouse) - function.points()[*dragged_].x);
+    else
+      function.movePoint(*dragged_, canvas.xOf(mouse), opacityAt(canvas.heightAt(mouse)));
     changed = true;
   }
   paintCurve(function, histogram_, marked, canvas);
   paintHeights(canvas);
   if (const auto shown = dragged_ ? dragged_ : near) {
     const OpacityPoint& point = function.points()[*shown];
-    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove", function.scalarAt(point.x), point.opacity);
+    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove; Shift + drag moves all",
+                      function.scalarAt(point.x), point.opacity);
   } else if (over) {
     const double x = static_cast<double>(canvas.xOf(mouse));
     const auto bin = static_cast<size_t>(x * static_cast<double>(histogram_.size()));
@@ -347,7 +351,7 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
     function.setOpacities({points.begin(), points.end()});
     result.changed = true;
   };
-  set("band", "values in the middle of the range alone; drag its points to others", kBand);
+  set("band", "values in the middle of the range alone; Shift + drag moves its points together", kBand);
   set("clear", "nothing; add points for what is to be seen", kClear);
 }
 
@@ -364,16 +368,16 @@ void FunctionPanel::drawUnit(EditedFunction& function, Result& result) {
   const double usual = std::max(0.01 * glm::distance(manifest.lower, manifest.upper), 1e-300);
   constexpr double kThinnest = 0.01, kDensest = 10'000;
   double density = usual / unit;
-  label("density");
-  if (ImGui::SliderScalar("##density", ImGuiDataType_Double, &density, &kThinnest, &kDensest, "%.3g",
+  label("strength");
+  if (ImGui::SliderScalar("##strength", ImGuiDataType_Double, &density, &kThinnest, &kDensest, "%.3g",
                           ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
     constexpr int kDigits = 3;
     function.setOpacityUnit(roundedTo(usual / density, usual / density, kDigits));
     result.changed = true;
   }
   result.dragging |= ImGui::IsItemActive();
-  nameWidget("density");
-  hint("a hundredth of the data's size, over the opacity unit");
+  nameWidget("strength");
+  hint("how opaque all is: a hundredth of the data's size, over the opacity unit");
 }
 
 }  // namespace curvisplat

@@ -78,19 +78,24 @@ GradientPanel::Result GradientPanel::draw(std::vector<OpacityPoint>& points, siz
   if (points.empty()) return result;
   result.error = updateMagnitudes({variable, scale});
   drawHistogram(points, variable);
-  float from = 0, to = 1;
+  float from = 0, to = 1;  // then in per cent
   for (const OpacityPoint& point : points)
     if (point.opacity <= points.front().opacity) from = static_cast<float>(point.x);
   for (size_t n = points.size(); n-- > 0;)
     if (points[n].opacity >= points.back().opacity) to = static_cast<float>(points[n].x);
-  label("shown from");
-  if (ImGui::DragFloatRange2("##gradient", &from, &to, 0.003f, 0, 1, "from %.2f", "to %.2f")) {
-    points = rampBetween(std::clamp(from, 0.0f, 1.0f), std::clamp(std::max(from, to), 0.0f, 1.0f));
+  label("volume less steep");
+  from *= 100, to *= 100;
+  if (ImGui::DragFloatRange2("##gradient", &from, &to, 0.3f, 0, 100, "hidden: %.0f %%", "whole: %.0f %%")) {
+    const auto share = [](float percent) { return std::clamp(static_cast<double>(percent) / 100, 0.0, 1.0); };
+    points = rampBetween(share(from), share(std::max(from, to)));
     result.changed = true;
   }
   result.dragging = ImGui::IsItemActive();
   nameWidget("gradient shares");
-  hint("the shares of the volume that is less steep, where opacity begins and where it is whole");
+  hint(
+      "What is less steep than the first part of the volume is hidden, what is steeper than the second is "
+      "whole;\n"
+      "drag to change, Ctrl + click to type a number.");
   return result;
 }
 

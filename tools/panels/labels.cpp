@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
+
 #include "tools/window/widgets.h"
 
 namespace curvisplat {
@@ -103,7 +105,27 @@ Section::Section(const char* text, std::optional<size_t>& seen, size_t number) {
 }
 
 void hint(const char* text) {
-  if (ImGui::IsItemHovered() && !ImGui::IsItemActive()) ImGui::SetTooltip("%s", text);
+  constexpr double kAfterSeconds = 0.4;
+  static ImVec2 hovered{-1, -1};  // the corner of the widget that the mouse rests on
+  static double since_s = 0;
+  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
+  const bool is_same = hovered.x == from.x && hovered.y == from.y;
+  if (!ImGui::IsItemHovered() || ImGui::IsItemActive()) {
+    if (is_same) hovered = {-1, -1};
+    return;
+  }
+  if (!is_same) since_s = ImGui::GetTime();
+  hovered = from;
+  if (ImGui::GetTime() - since_s < kAfterSeconds) return;
+  // Beside the widget and not on it, nor on its neighbours in the line.
+  const ImGuiStyle& style = ImGui::GetStyle();
+  const ImVec2 text_size = ImGui::CalcTextSize(text), screen = ImGui::GetIO().DisplaySize;
+  const float width = text_size.x + 2 * style.WindowPadding.x,
+              height = text_size.y + 2 * style.WindowPadding.y;
+  const float below = to.y + style.ItemSpacing.y;
+  ImGui::SetNextWindowPos({std::max(0.0f, std::min(from.x, screen.x - width)),
+                           below + height > screen.y ? from.y - style.ItemSpacing.y - height : below});
+  ImGui::SetTooltip("%s", text);
 }
 
 }  // namespace curvisplat

@@ -31,16 +31,19 @@ int drawTabs(int number, int select) {
   const int shown = *stored < number ? *stored : 0;
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {0.9f * unit, 0.4f * unit});
   ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0.3f * unit, 0});
-  ImGui::PushStyleColor(ImGuiCol_ButtonHovered, ImGui::GetStyleColorVec4(ImGuiCol_TabHovered));
+  const ImVec4 chosen = ImGui::GetStyleColorVec4(ImGuiCol_TabActive),
+               other = ImGui::GetStyleColorVec4(ImGuiCol_Tab);
+  // One under the mouse does not look more chosen than the one that is.
+  const ImVec4 hovered(0.5f * (chosen.x + other.x), 0.5f * (chosen.y + other.y), 0.5f * (chosen.z + other.z),
+                       0.5f * (chosen.w + other.w));
   for (int n = 0; n < number; ++n) {
     if (n > 0) ImGui::SameLine();
-    ImGui::PushStyleColor(ImGuiCol_Button,
-                          ImGui::GetStyleColorVec4(n == shown ? ImGuiCol_TabActive : ImGuiCol_Tab));
+    ImGui::PushStyleColor(ImGuiCol_Button, n == shown ? chosen : other);
+    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, n == shown ? chosen : hovered);
     if (ImGui::Button(kTabs[n])) *stored = n;
-    ImGui::PopStyleColor();
+    ImGui::PopStyleColor(2);
     nameWidget(std::string("tab ") + kTabs[n]);
   }
-  ImGui::PopStyleColor();
   ImGui::Separator();
   ImGui::PopStyleVar(2);
   return shown;
@@ -72,8 +75,16 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   const bool has_more = hasMoreObjects(state);
   const bool is_series = facts.playback && facts.playback->steps() > 1;
   const int shown = drawTabs(is_series ? 4 : 3, has_more ? 1 : -1);
-  // Each tab scrolls by itself. The scroll bar is always there, so that widgets keep their width.
+  // Each tab scrolls by itself. The scroll bar always has its place, so that widgets keep their width.
+  const ImVec4 clear(0, 0, 0, 0);
+  if (!scrolls_)
+    for (const ImGuiCol part : {ImGuiCol_ScrollbarBg, ImGuiCol_ScrollbarGrab, ImGuiCol_ScrollbarGrabHovered,
+                                ImGuiCol_ScrollbarGrabActive})
+      ImGui::PushStyleColor(part, clear);
   ImGui::BeginChild(kTabs[shown], {0, -footer}, false, ImGuiWindowFlags_AlwaysVerticalScrollbar);
+  if (!scrolls_) ImGui::PopStyleColor(4);
+  scrolls_ = ImGui::GetScrollMaxY() > 0;
+  ImGui::Spacing();
   if (shown == 0) drawColour(state, facts, actions);
   if (shown == 1) drawObjects(state, facts, actions);
   if (shown == 2) drawView(state, actions, facts);

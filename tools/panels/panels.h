@@ -88,6 +88,7 @@ class Panels {
   std::string view_name_;
   FilmPanel film_;
   std::optional<size_t> objects_seen_, keys_seen_;  // in the frame before
+  bool scrolls_ = false;                            // the tab that was shown then
 };
 
 }  // namespace curvisplat

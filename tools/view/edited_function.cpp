@@ -162,6 +162,15 @@ void EditedFunction::movePoint(size_t point, double x, double opacity) {
   edited();
 }
 
+void EditedFunction::movePointsTogether(double by) {
+  const std::span<OpacityPoint> all(definition_.opacities);
+  if (all.size() < 3) return;
+  const std::span<OpacityPoint> moved = all.subspan(1, all.size() - 2);
+  by = std::clamp(by, -moved.front().x, 1 - moved.back().x);
+  for (OpacityPoint& point : moved) point.x += by;
+  edited();
+}
+
 void EditedFunction::removePoint(size_t point) {
   auto& points = definition_.opacities;
   if (point == 0 || point + 1 >= points.size()) return;

@@ -77,6 +77,8 @@ class EditedFunction {
   size_t addPoint(double x, double opacity);
   /// Clamps x between the neighbours (0 and 1 for the first and last point) and opacity to 0..1.
   void movePoint(size_t point, double x, double opacity);
+  /// Moves all but the first and the last point sideways, until one of them would leave 0..1.
+  void movePointsTogether(double by);
   /// Does nothing for the first and the last point.
   void removePoint(size_t point);
 

@@ -176,10 +176,13 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   const bool looks =
       values_asked_for_ == request_ && !values_failed_ && !(values_ && values_->request == request_);
   const bool points = window_.pointed().has_value();
-  const std::string text = !probed_.empty()       ? probed_
-                           : looks && points      ? "reading the value under the mouse ..."
-                           : points && !isFinal() ? "values when the picture is final"
-                                                  : "";
+  const bool sets_marker = clicked_ || marker_question_;
+  const std::string text = sets_marker && isFinal() ? "reading the value of the marker ..."
+                           : sets_marker            ? "a marker follows when the picture is final"
+                           : !probed_.empty()       ? probed_
+                           : looks && points        ? "reading the value under the mouse ..."
+                           : points && !isFinal()   ? "values when the picture is final"
+                                                    : "";
   ImGui::TextUnformatted(text.c_str());
   nameArea("status " + text, place.x, place.y, place.width, place.height);
   const std::string state =
@@ -302,10 +305,10 @@ void CacheView::copyCommand(MovieKind what) {
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);
-    say(fmt::format("copied the command for {}; paste it into a terminal", of_film ? "the film"
-                                                                           : what == MovieKind::kOneTurn
-                                                                               ? "a movie"
-                                                                               : "this picture"));
+    const char* const shown = of_film ? "the film" : what == MovieKind::kOneTurn ? "a movie" : "this picture";
+    // Its paths are short ones.
+    say(fmt::format("copied the command for {}; paste it into a terminal in {}", shown,
+                    fs::current_path().string()));
   } catch (const Error& error) {
     reports_.report(error);
   }
