@@ -44,6 +44,16 @@ class WindowPanels : public WindowTest {
     }
     return std::hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1], ends[1][2] - ends[0][2]);
   }
+  /// The numbers of an option's value, with commas between them.
+  static std::array<double, 6> numbersOf(const std::string& text) {
+    std::array<double, 6> numbers{};
+    std::istringstream stream(text);
+    for (double& number : numbers) {
+      stream >> number;
+      stream.ignore();
+    }
+    return numbers;
+  }
   static bool gone(const std::string& begin) {
     return eventually([&] { return !hasWidget(begin); });
   }
@@ -139,6 +149,91 @@ TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
   // The camera stayed: the handle was dragged, not the picture.
   EXPECT_EQ(valueOf(commands[0], "--position"), valueOf(commands[1], "--position"));
   expectDraws(commands[1], moved);
+}
+
+/// The grip at the normal's tip turns a plane about its middle, towards where it is dragged; numbers can be typed.
+TEST_F(WindowPanels, APlaneIsTurnedInThePictureAndByNumbers) {
+  open({}, kScreen);
+  press("x");
+  choose("Picture", "Add a clip plane");  // facing the viewer
+  const Image facing = saveAndCopy();
+  const Place tip = placeOf("tip 1");
+  drag(1, tip, {tip.first + pictureSize().width / 20, tip.second});
+  const Image turned = saveAndCopy();
+  EXPECT_LT(difference(facing, turned), 40);
+  click(placeOf("normal of clip plane 1", 0.15));  // its first field
+  save();
+  press("ctrl+a");
+  act({"type", "1"});
+  press("Tab");
+  save();
+  press("ctrl+a");
+  act({"type", "1"});
+  press("Tab");
+  save();
+  press("ctrl+a");
+  act({"type", "0"});
+  press("Return");
+  save();
+  const Image typed = saveAndCopy();
+  EXPECT_LT(difference(turned, typed), 40);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 3u);
+  const auto before = numbersOf(valueOf(commands[0], "--clip-plane"));
+  const auto after = numbersOf(valueOf(commands[1], "--clip-plane"));
+  const auto last = numbersOf(valueOf(commands[2], "--clip-plane"));
+  // From +x one sees y at the right: the tip went there, and not up.
+  EXPECT_NEAR(std::abs(before[3]), 1, 1e-6);
+  EXPECT_GT(after[4], 0.1);
+  EXPECT_NEAR(after[5], 0, 0.05);
+  EXPECT_NEAR(std::hypot(after[3], after[4], after[5]), 1, 1e-6);
+  // Its middle stays in it.
+  double from_plane = 0;
+  for (size_t n = 0; n < 3; ++n) from_plane += (after[n] - before[n]) * after[n + 3];
+  EXPECT_NEAR(from_plane, 0, 1e-6);
+  EXPECT_NEAR(last[3], std::sqrt(0.5), 1e-6);
+  EXPECT_NEAR(last[4], std::sqrt(0.5), 1e-6);
+  EXPECT_NEAR(last[5], 0, 1e-9);
+  EXPECT_EQ(valueOf(commands[0], "--position"), valueOf(commands[1], "--position"));
+  expectDraws(commands[1], turned);
+  expectDraws(commands[2], typed);
+}
+
+/// The name of an axis in the picture is pressed: the view is that of the key, and then that from the other side.
+TEST_F(WindowPanels, AxesAreLookedAlongByAClick) {
+  open();
+  press("y");
+  const Image by_key = save();
+  const Place along = placeOf("axis y");
+  press("i");  // isometric: every name has a place of its own
+  save();
+  const auto isThere = [&] { return placeOf("axis y") == along; };
+  EXPECT_TRUE(eventually([&] { return !isThere(); }));
+  click("axis y");
+  EXPECT_TRUE(eventually(isThere));
+  moveTo(rest_);
+  EXPECT_GE(difference(save(), by_key), 50);
+  click("axis y");
+  moveTo(rest_);
+  const Image behind = save();
+  EXPECT_LT(difference(behind, by_key), 40);
+  press("shift+y");
+  EXPECT_GE(difference(save(), behind), 50);
+  close();
+}
+
+/// The far edges lie behind the data in the window, in its saved picture and in the command's.
+TEST_F(WindowPanels, OutlineAndGridLieBehindTheDataEverywhere) {
+  open({}, kScreen);
+  tab("View");
+  const Image plain = save();
+  click("outline");
+  click("axes grid");
+  moveTo({1, kScreen.height - 1});
+  const Image saved = saveAndCopy();
+  EXPECT_LT(difference(plain, saved), 40);
+  EXPECT_GE(difference(shown(pictureSize()), saved), 45);
+  expectDraws(close().at(0), saved);
 }
 
 /// The frame of a cut is hidden, and the cut is not.

@@ -17,10 +17,44 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImU32 kColour = IM_COL32(235, 140, 30, 255);
+constexpr ImU32 kColour = IM_COL32(235, 140, 30, 255), kDragged = IM_COL32(255, 200, 60, 255);
 
 ImVec2 toImGui(const glm::dvec2& point) {
   return {static_cast<float>(point.x), static_cast<float>(point.y)};
+}
+
+glm::dvec2 mouse() {
+  return {static_cast<double>(ImGui::GetIO().MousePos.x), static_cast<double>(ImGui::GetIO().MousePos.y)};
+}
+
+/// Half the side of a grip's square.
+double gripSize() {
+  return 0.45 * static_cast<double>(ImGui::GetFontSize());
+}
+
+/// Draws a grip over the picture. Returns whether it is pressed now.
+bool drawGrip(const glm::dvec2& at, const std::string& name, ImU32 colour, const char* help, Window& window) {
+  const double size = gripSize();
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  list->AddCircleFilled(toImGui(at), static_cast<float>(size), colour);
+  list->AddCircle(toImGui(at), static_cast<float>(size), IM_COL32(0, 0, 0, 255));
+  const Rectangle grip{at.x - size, at.y - size, 2 * size, 2 * size};
+  window.cover(grip);
+  nameArea(name, grip.x, grip.y, grip.width, grip.height);
+  if (!grip.contains(mouse()) || ImGui::GetIO().WantCaptureMouse) return false;
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) ImGui::SetTooltip("%s", help);
+  return ImGui::IsMouseClicked(ImGuiMouseButton_Left);
+}
+
+/// The screen's directions, in the data as it is stretched by --scale.
+struct ScreenAxes {
+  glm::dvec3 right, up, forward;
+};
+
+ScreenAxes axesOf(const Camera& camera) {
+  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
+  const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.usableViewUp()));
+  return {right, glm::cross(right, forward), forward};
 }
 
 /// The plane's point nearest to the middle of the data, its normal at unit length, and two directions in it.
@@ -70,63 +104,123 @@ void drawBox(const WorldBox& box, const PlaceInWindow& place) {
 
 }  // namespace
 
+glm::dvec3 turnedTo(const glm::dvec2& tip, bool is_behind, const Camera& camera) {
+  const double length = glm::length(tip);
+  const glm::dvec2 at = length > 1 ? tip / length : tip;
+  const double depth = std::sqrt(std::max(0.0, 1 - glm::dot(at, at)));
+  const ScreenAxes axes = axesOf(camera);
+  return glm::normalize(at.x * axes.right + at.y * axes.up + (is_behind ? depth : -depth) * axes.forward);
+}
+
 bool PlaneHandles::draw(ViewState& state, const Manifest& manifest, const PlaceInWindow& place,
                         Window& window) {
   if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragged_.reset();
   if (state.clip_box) drawBox(*state.clip_box, place);
-  bool moved = false;
+  const Scene scene{manifest, place, window, state.camera, state.scale};
+  bool changed = false;
   size_t number = 0;
   for (auto* planes : {&state.clip_planes, &state.slices})
     for (ListedPlane& plane : *planes) {
-      if (plane.visible) moved |= drawOne(plane, number, manifest, place, window);
+      if (plane.visible) changed |= drawOne(plane, number, scene);
       ++number;
     }
-  return moved;
+  return changed;
 }
 
-bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Manifest& manifest,
-                           const PlaceInWindow& place, Window& window) {
-  const Frame frame = frameOf(plane, manifest);
-  const double reach = reachAlong(frame.normal, manifest);
-  const double wide = reachAlong(frame.across, manifest), high = reachAlong(frame.up, manifest);
-  const auto handle = place(frame.middle);
+bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Scene& scene) {
+  const Frame frame = frameOf(plane, scene.manifest);
+  const double reach = reachAlong(frame.normal, scene.manifest);
+  const double wide = reachAlong(frame.across, scene.manifest), high = reachAlong(frame.up, scene.manifest);
+  const auto handle = scene.place(frame.middle);
   // A plane that faces the viewer is moved by dragging upwards.
-  const auto end = place(frame.middle + reach * frame.normal);
+  const auto end = scene.place(frame.middle + reach * frame.normal);
   if (!handle || !end) return false;
-  ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  const bool dragged = dragged_ == number;
-  const ImU32 colour = dragged ? IM_COL32(255, 200, 60, 255) : kColour;
+  const bool is_dragged = dragged_ && dragged_->number == number;
+  const ImU32 colour = is_dragged ? kDragged : kColour;
   std::array<ImVec2, 4> corners;
   bool seen = true;
   for (size_t n = 0; n < 4; ++n) {
     const double x = n == 0 || n == 3 ? -wide : wide, y = n < 2 ? -high : high;
-    const auto corner = place(frame.middle + x * frame.across + y * frame.up);
+    const auto corner = scene.place(frame.middle + x * frame.across + y * frame.up);
     seen &= corner.has_value();
     if (corner) corners[n] = toImGui(*corner);
   }
-  if (seen) list->AddPolyline(corners.data(), 4, colour, ImDrawFlags_Closed, 0.11f * ImGui::GetFontSize());
-  const double size = 0.45 * static_cast<double>(ImGui::GetFontSize());
-  list->AddLine(toImGui(*handle), toImGui(*handle + 0.3 * (*end - *handle)), colour,
-                0.15f * ImGui::GetFontSize());
-  list->AddCircleFilled(toImGui(*handle), static_cast<float>(size), colour);
-  list->AddCircle(toImGui(*handle), static_cast<float>(size), IM_COL32(0, 0, 0, 255));
-  const Rectangle grip{handle->x - size, handle->y - size, 2 * size, 2 * size};
-  window.cover(grip);
-  nameArea(fmt::format("handle {}", number + 1), grip.x, grip.y, grip.width, grip.height);
+  if (seen)
+    ImGui::GetBackgroundDrawList()->AddPolyline(corners.data(), 4, colour, ImDrawFlags_Closed,
+                                                0.11f * ImGui::GetFontSize());
+  const bool turns = drawTip(plane, number, frame.middle, scene);
+  const bool moves = drawHandle(plane, number, {frame.normal, reach, *handle, *end}, scene);
+  return turns || moves;
+}
 
-  const ImGuiIO& io = ImGui::GetIO();
-  const glm::dvec2 mouse(static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
-  if (ImGui::IsMouseClicked(ImGuiMouseButton_Left) && grip.contains(mouse) && !dragged_) dragged_ = number;
-  if (dragged_ != number) return false;
-  const glm::dvec2 movement = mouse - *handle;
-  const bool faces = glm::length(*end - *handle) < 8;
-  const double share =
-      faces ? -static_cast<double>(io.MouseDelta.y) / 200 : shiftAlong(*handle, *end, movement);
-  const double now = glm::dot(frame.normal, plane.point - 0.5 * (manifest.lower + manifest.upper));
-  const double then = std::clamp(now + share * reach, -reach, reach);
-  if (then == now || (!faces && glm::length(movement) < 0.5)) return false;
-  plane.point += (then - now) * frame.normal;
+/// Draws the grip at the tip of the normal, which turns the plane about its middle. The line has one length on the screen,
+/// whatever the data's.
+bool PlaneHandles::drawTip(ClipPlane& plane, size_t number, const glm::dvec3& middle, const Scene& scene) {
+  const double lever = 5 * static_cast<double>(ImGui::GetFontSize()), size = gripSize();
+  const glm::dvec3 normal = glm::normalize(plane.normal / scene.scale);  // as it is seen
+  const ScreenAxes axes = axesOf(scene.camera);
+  const glm::dvec2 tip(glm::dot(normal, axes.right), glm::dot(normal, axes.up));
+  const glm::dvec2 handle = *scene.place(middle);
+  glm::dvec2 along = lever * glm::dvec2(tip.x, -tip.y);
+  // Where the normal points at the viewer or away, the grip lies beside the other one.
+  const double nearest = 2.5 * size, length = glm::length(along);
+  if (length < nearest) along = length > 0.1 ? nearest / length * along : glm::dvec2(0, -nearest);
+  const bool is_dragged = dragged_ && dragged_->number == number && dragged_->turns;
+  const ImU32 colour = is_dragged ? kDragged : kColour;
+  ImGui::GetBackgroundDrawList()->AddLine(toImGui(handle), toImGui(handle + along), colour,
+                                          0.15f * ImGui::GetFontSize());
+  const bool pressed = drawGrip(handle + along, fmt::format("tip {}", number + 1), colour,
+                                "drag to turn the plane", scene.window);
+  if (pressed && !dragged_) {
+    dragged_ = Drag{number, true, mouse(), tip, glm::dot(normal, axes.forward) > 0};
+    plane.point = middle;
+  }
+  if (!dragged_ || dragged_->number != number || !dragged_->turns) return false;
+  const glm::dvec2 movement = mouse() - dragged_->from;
+  if (glm::length(movement) < 0.5) return false;
+  const glm::dvec3 turned =
+      glm::normalize(turnedTo(dragged_->tip + glm::dvec2(movement.x, -movement.y) / lever,
+                              dragged_->is_behind, scene.camera) *
+                     scene.scale);
+  if (glm::distance(turned, plane.normal) < 1e-9) return false;
+  plane.normal = turned;
   return true;
+}
+
+/// Draws the grip in the middle, which moves the plane along its normal.
+bool PlaneHandles::drawHandle(ClipPlane& plane, size_t number, const Normal& normal, const Scene& scene) {
+  const bool is_dragged = dragged_ && dragged_->number == number && !dragged_->turns;
+  const bool pressed = drawGrip(normal.handle, fmt::format("handle {}", number + 1),
+                                is_dragged ? kDragged : kColour, "drag to move the plane", scene.window);
+  if (pressed && !dragged_) dragged_ = Drag{number};
+  if (!dragged_ || dragged_->number != number || dragged_->turns) return false;
+  const glm::dvec2 movement = mouse() - normal.handle;
+  const bool faces = glm::length(normal.end - normal.handle) < 8;
+  const double share = faces ? -static_cast<double>(ImGui::GetIO().MouseDelta.y) / 200
+                             : shiftAlong(normal.handle, normal.end, movement);
+  const glm::dvec3 centre = 0.5 * (scene.manifest.lower + scene.manifest.upper);
+  const double now = glm::dot(normal.along, plane.point - centre);
+  const double then = std::clamp(now + share * normal.reach, -normal.reach, normal.reach);
+  if (then == now || (!faces && glm::length(movement) < 0.5)) return false;
+  plane.point += (then - now) * normal.along;
+  return true;
+}
+
+std::optional<size_t> pressedAxis(const std::array<glm::dvec2, 3>& places, Window& window) {
+  const double radius = 0.8 * static_cast<double>(ImGui::GetFontSize());
+  std::optional<size_t> pressed;
+  bool has_ring = false;
+  for (size_t axis = 0; axis < places.size(); ++axis) {
+    const Rectangle area{places[axis].x - radius, places[axis].y - radius, 2 * radius, 2 * radius};
+    window.cover(area);
+    nameArea(fmt::format("axis {}", "xyz"[axis]), area.x, area.y, area.width, area.height);
+    if (has_ring || !area.contains(mouse()) || ImGui::GetIO().WantCaptureMouse) continue;
+    has_ring = true;
+    ImGui::GetBackgroundDrawList()->AddCircle(toImGui(places[axis]), static_cast<float>(radius), kColour, 0,
+                                              0.12f * ImGui::GetFontSize());
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) pressed = axis;
+  }
+  return pressed;
 }
 
 namespace {

@@ -6,6 +6,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include <array>
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
@@ -22,19 +24,46 @@ namespace curvisplat {
 /// The place of a point of the data in the window, in Dear ImGui units; nullopt if it is behind the viewer.
 using PlaceInWindow = std::function<std::optional<glm::dvec2>(const glm::dvec3&)>;
 
-/// Clip planes and slices in the picture: a frame in the data with a handle in its middle, which is dragged
-/// along the plane's normal. The clip box has its edges there.
+/// Clip planes and slices in the picture: a frame in the data with a grip in its middle, which is dragged
+/// along the plane's normal, and one at the normal's tip, which turns it. The clip box has its edges there.
 class PlaneHandles {
  public:
-  /// Draws the planes over the picture and moves the one that is dragged. Returns whether one was moved.
+  /// Draws the planes over the picture; moves or turns the one that is dragged. Returns whether one was.
   bool draw(ViewState& state, const Manifest& manifest, const PlaceInWindow& place, Window& window);
   bool isDragging() const { return dragged_.has_value(); }
 
  private:
-  bool drawOne(ClipPlane& plane, size_t number, const Manifest& manifest, const PlaceInWindow& place,
-               Window& window);
-  std::optional<size_t> dragged_;  // clip planes first, then slices
+  struct Scene {
+    const Manifest& manifest;
+    const PlaceInWindow& place;
+    Window& window;
+    const Camera& camera;
+    const glm::dvec3& scale;
+  };
+  struct Normal {
+    glm::dvec3 along;        // of unit length
+    double reach;            // half the data's extent along it
+    glm::dvec2 handle, end;  // where the plane's middle and the data's end along the normal are seen
+  };
+  struct Drag {
+    size_t number = 0;  // clip planes first, then slices
+    bool turns = false;
+    glm::dvec2 from{0.0}, tip{0.0};  // the mouse and the normal's tip (turnedTo()) when it was pressed
+    bool is_behind = false;          // the tip was farther away than the middle
+  };
+  bool drawOne(ClipPlane& plane, size_t number, const Scene& scene);
+  bool drawTip(ClipPlane& plane, size_t number, const glm::dvec3& middle, const Scene& scene);
+  bool drawHandle(ClipPlane& plane, size_t number, const Normal& normal, const Scene& scene);
+  std::optional<Drag> dragged_;
 };
+
+/// The direction of unit length whose tip is seen `tip` (to the right and up) from its foot, in units of its length:
+/// in front of the foot or behind it, or across the view where the tip lies further away.
+glm::dvec3 turnedTo(const glm::dvec2& tip, bool is_behind, const Camera& camera);
+
+/// The axis whose name is pressed in the picture; `places`: where the names stand in the window. The name that the mouse is
+/// over gets a ring.
+std::optional<size_t> pressedAxis(const std::array<glm::dvec2, 3>& places, Window& window);
 
 /// How far a plane moves along its normal (in lengths of the normal) for a movement of the mouse: to the
 /// point of the normal that is seen under the mouse. `from`, `to`: where the plane's point and the point at

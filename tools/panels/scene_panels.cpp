@@ -21,6 +21,11 @@ namespace {
 /// Says what the faces of a name are; empty for names that say it themselves.
 std::string meaningOf(const std::string& faces) {
   constexpr const char* kNotCut = "clip planes and the clip box do not cut them";
+  if (faces == "walls")
+    return fmt::format(
+        "walls, by the grid's boundary conditions, or, where it has none, faces on which the velocity is "
+        "zero; {}",
+        kNotCut);
   if (faces == "all") return fmt::format("all outer faces of the grid; {}", kNotCut);
   const bool is_lower = faces.ends_with("min"), is_upper = faces.ends_with("max");
   if (faces.size() != 4 || faces[0] < 'i' || faces[0] > 'k' || is_lower == is_upper) return {};
@@ -221,6 +226,7 @@ void CutPanel::drawPlane(ListedPlane& plane, const std::string& name, const View
     turn("flip", -plane.normal);
     hint("keep the other side");
   }
+  drawNormal(plane, name, actions);
   // From the data's one end along the normal to the other; a plane across an axis has its coordinate there.
   const PlaneScale scale = planeScaleOf(plane.normal);
   const double centre = glm::dot(scale.along, middle), reach = glm::dot(half, glm::abs(scale.along));
@@ -236,6 +242,24 @@ void CutPanel::drawPlane(ListedPlane& plane, const std::string& name, const View
   nameWidget(name);
   nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
   hint("drag it here or in the picture; Ctrl + click to type a number");
+}
+
+/// Draws the numbers of the plane's direction.
+void CutPanel::drawNormal(ListedPlane& plane, const std::string& name, PanelActions& actions) {
+  const glm::dvec3 unit = glm::normalize(plane.normal);
+  label("normal");
+  const auto typed = typed_.draw("##normal", {glm::value_ptr(unit), 3}, "%.3g");
+  nameWidget("normal of " + name);
+  hint("also dragged in the picture, by the grip at its tip");
+  if (!typed) return;
+  const glm::dvec3 normal((*typed)[0], (*typed)[1], (*typed)[2]);
+  const double length = glm::length(normal);
+  if (!std::isfinite(length) || length <= 0) {
+    actions.error = fmt::format("normal of {}: it has no length; expected a direction", name);
+    return;
+  }
+  plane.normal = normal / length;
+  actions.changed = true;
 }
 
 void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
@@ -260,7 +284,7 @@ void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces,
 void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>& faces,
                                 PanelActions& actions) {
   const bool is_full = state.surfaces.size() + state.faces.size() >= kMaxSurfaces;
-  label("add wall or grid face");
+  label("add wall or face");
   ImGui::BeginDisabled(faces.empty() || is_full);
   if (ImGui::BeginCombo("##add surface", faces.empty() ? "the cache has none" : "choose ...",
                         ImGuiComboFlags_HeightLarge)) {

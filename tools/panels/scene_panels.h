@@ -11,6 +11,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/panels/labels.h"
 #include "tools/view/view_state.h"
+#include "tools/window/widgets.h"
 
 namespace curvisplat {
 
@@ -25,8 +26,10 @@ class CutPanel {
   static void drawSliceOpacity(ViewState& state, PanelActions& actions);
   void drawPlanes(std::vector<ListedPlane>& planes, const ViewState& state, PanelActions& actions);
   void drawPlane(ListedPlane& plane, const std::string& name, const ViewState& state, PanelActions& actions);
+  void drawNormal(ListedPlane& plane, const std::string& name, PanelActions& actions);
 
   const CacheReader& cache_;
+  TypedNumbers typed_;
   std::optional<size_t> planes_seen_, slices_seen_;  // in the frame before
 };
 

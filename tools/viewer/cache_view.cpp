@@ -271,6 +271,7 @@ void CacheView::annotate() {
   const AnnotatedScene scene =
       sceneOf(state_, functions, *shown_, picture_size_, globe_grid_.boxOf(state_, cache_));
   overlay_.set(annotationLayer(state_.annotations, scene), picture_size_);
+  axis_names_ = axisNames(scene);
   window_.redraw();
   shown_strip_ = 1 - static_cast<double>(data_size_.width) / picture_size_.width;
 }

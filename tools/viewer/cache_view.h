@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <future>
+#include <glm/vec2.hpp>
 #include <map>
 #include <memory>
 #include <optional>
@@ -156,6 +158,7 @@ class CacheView {
   void annotate();
   void showPicture(const WindowLayout& layout);
   void showPlanesAndMarkers(const WindowLayout& layout);
+  void lookAlongPressedAxis(const WindowLayout& layout);
   void probe(const WindowLayout& layout);
   struct Click;
   bool isSeenAt(const Click& click) const;
@@ -227,7 +230,8 @@ class CacheView {
   ImageSize picture_size_{0, 0}, data_size_{0, 0};  // of the newest request
   double fitted_width_ = 0;  // of the data's part of the picture, when the view was fitted to it
   std::optional<ShownFrame> shown_;
-  double shown_strip_ = 0;  // part of the picture that the scalar bars take
+  std::optional<std::array<glm::dvec2, 3>> axis_names_;  // where they stand in that picture, in pixels
+  double shown_strip_ = 0;                               // part of the picture that the scalar bars take
   bool was_moving_ = false, dragging_ = false, rests_ = false;
   std::optional<std::filesystem::path> save_to_;  // once the picture is final; empty: the next number
   std::optional<MovieKind> copy_requested_;       // the command for one of these

@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <future>
+#include <glm/geometric.hpp>
 #include <utility>
 
 #include <GLFW/glfw3.h>
@@ -75,7 +77,23 @@ void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
   drawMarkerSigns(state_, place);
   // Over the signs: they are what one takes hold of.
   if (shows_frames_) changed_ |= handles_.draw(state_, manifest(), place, window_);
+  if (state_.annotations.axes && axis_names_) lookAlongPressedAxis(layout);
   list->PopClipRect();
+}
+
+/// Looks from the end of an axis whose name in the picture is pressed; from its other end where it is seen so already.
+void CacheView::lookAlongPressedAxis(const WindowLayout& layout) {
+  constexpr std::pair<Command, Command> kLooks[]{{Command::kLookPlusX, Command::kLookMinusX},
+                                                 {Command::kLookPlusY, Command::kLookMinusY},
+                                                 {Command::kLookPlusZ, Command::kLookMinusZ}};
+  std::array<glm::dvec2, 3> places = *axis_names_;
+  for (glm::dvec2& place : places)
+    place = glm::dvec2(layout.picture.x, layout.picture.y) + place / window_.pixelScale();
+  const std::optional<size_t> pressed = pressedAxis(places, window_);
+  if (!pressed) return;
+  const glm::dvec3 forward = glm::normalize(state_.camera.focal_point - state_.camera.position);
+  const bool is_seen = forward[static_cast<int>(*pressed)] < -0.999;
+  run(is_seen ? kLooks[*pressed].second : kLooks[*pressed].first);
 }
 
 /// Finds the values where the mouse rests: first the depth of the picture's pixels, then what the data have

@@ -25,7 +25,7 @@ bool loadFont(float pixels, float pixels_per_unit);
 /// object serves any number of fields, of which one at a time is typed into.
 class TypedNumbers {
  public:
-  static constexpr size_t kMax = 2;
+  static constexpr size_t kMax = 3;
   /// Draws a field for each of `values`, beside each other. Returns what was typed, once, when all of them
   /// have been left; Escape takes back what was typed. `label` is Dear ImGui's, `format` is printf's.
   std::optional<std::array<double, kMax>> draw(const char* label, std::span<const double> values,

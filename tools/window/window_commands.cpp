@@ -299,14 +299,16 @@ void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& 
 
 void drawKeys(bool& open, Window& window) {
   if (!open) return;
-  constexpr std::array<std::pair<const char*, const char*>, 8> kMouse{{
+  constexpr std::array<std::pair<const char*, const char*>, 10> kMouse{{
       {"left drag", "rotate; while flying, look around"},
       {"wheel", "zoom to what is under the mouse"},
       {"right drag", "zoom"},
       {"middle drag, Shift + left drag", "move the picture"},
       {"click", "keep the value there as a marker"},
-      {"drag a round handle", "move a clip plane or a slice"},
+      {"click an arrow of the axes", "look along it; again: from its other end"},
+      {"drag a round handle", "move a clip plane or a slice; that at the tip turns it"},
       {"click into the curve", "add an opacity point; drag it; right click removes it"},
+      {"Shift + drag in the curve", "move all points but the first and the last sideways"},
       {"drop files", "open them"},
   }};
   if (beginWindow("Keys and mouse", open, window)) {
