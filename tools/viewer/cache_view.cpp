@@ -212,7 +212,8 @@ void CacheView::takeFrame() {
   reports_.settle(About::kPicture);
   if (frame->options.background.a < 1) {  // as frameOptions() has it for what lies behind the data
     const ShownFunctions functions(state_, manifest());
-    putBehind(frame->image, state_.annotations, sceneOf(state_, functions, *frame, frame->image.size));
+    putBehind(frame->image, state_.annotations,
+              sceneOf(state_, functions, *frame, frame->image.size, globe_grid_.boxOf(state_, cache_)));
     frame->bytes = bytesOf(frame->image);
   }
   picture_.set(frame->bytes, frame->image.size);
