@@ -210,6 +210,24 @@ TEST_F(RanksCommand, ConvertTogether) {
     EXPECT_EQ(entry.path().filename().string().find("shared.splats."), std::string::npos) << entry.path();
 }
 
+TEST_F(RanksCommand, CutCellsByNeedAlike) {
+  run({"generate", "wake", "--size", "20x16x12", "-o", file("cut")});
+  const auto to = [](const std::string& name) {
+    return Words{"convert", file("cut.xyz"), file("cut.fun"), "--threads", "1", "--overwrite",
+                 "-o",      file(name)};
+  };
+  run(to("one.splats"));
+  EXPECT_NE(run({"info", file("one.splats")}).out.find("each cell of the files' grid is"), std::string::npos);
+  for (const unsigned count : {2u, 3u}) {
+    const ProgramResult shared = runAsRanks(count, to("cut.splats"));
+    EXPECT_EQ(shared.status, 0) << shared.err;
+    Files expected = filesOf(file("one.splats")), found = filesOf(file("cut.splats"));
+    expected.erase("manifest.json");  // their titles differ
+    found.erase("manifest.json");
+    EXPECT_TRUE(found == expected) << count;
+  }
+}
+
 TEST_F(RanksCommand, ConvertASeriesTogether) {
   run({"generate", "wake", "--size", "40x30x16", "--steps", "7", "-o", file("s")});
   const auto to = [&](const std::string& name, const Words& more = {}) {

@@ -93,13 +93,15 @@ TEST_F(RefinedConvert, MergesTheNewNodesOfJoints) {
   EXPECT_EQ(convertTo("4", *refined(pipe(), parts)).merged_nodes, (4 * parts + 1) * (5 * parts + 1));
 }
 
-TEST_F(RefinedConvert, HasTheSameBytesForAnyThreadsAndMemory) {
+TEST_F(RefinedConvert, HasTheSameBytesForAnyThreadsMemoryAndRanks) {
   for (const Centring centring : {Centring::kNode, Centring::kCell}) {
     ConvertOptions options = optionsFor("one");
     options.threads = 1;
     options.overwrite = true;
     expectSameCaches(*refined(pipe(centring), 4), options,
-                     {{.threads = 2, .bucket_splats = 500, .slab_bytes = 40'000}});
+                     {{.threads = 2, .bucket_splats = 500, .slab_bytes = 40'000},
+                      {.bucket_splats = 500, .slab_bytes = 40'000, .ranks = 2},
+                      {.bucket_splats = 500, .slab_bytes = 40'000, .ranks = 3}});
   }
 }
 
