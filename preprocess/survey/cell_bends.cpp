@@ -30,6 +30,10 @@ constexpr double kMaxDeviation = 1.0;  // of a block that is not cut
 // deviates by more: a few blocks that are cut alone make the cells at their joints uneven.
 constexpr double kMaxDeviationOfSmall = 0.6;
 constexpr uint64_t kSmallGrid = 100'000;  // nodes
+// Small grids of several blocks have most nodes at borders and at joints with a kink, which are not measured: cells of
+// blocks that deviate by more are halved along all axes.
+constexpr double kMaxDeviationOfTiny = 0.3;
+constexpr uint64_t kTinyGrid = 10'000;  // nodes
 constexpr uint64_t kLargeGrid = 1'000'000;
 // A large grid's survey takes a few percent of a conversion.
 constexpr uint64_t kSampledNodes = 2'000'000;
@@ -184,8 +188,8 @@ class CutChoice {
       }
   }
 
-  /// `most`: nodes.
-  Refinement run(uint64_t most) {
+  /// Cuts cells along the axes that need it. `most`: nodes.
+  void cutByNeed(uint64_t most) {
     struct Waiting {
       double square;
       uint32_t block;
@@ -213,6 +217,21 @@ class CutChoice {
       nodes += best->nodes;
       wait(worst.block);
     }
+  }
+
+  /// Halves the cells of blocks that deviate by more than `max` along the axes that are not cut. `most`: nodes.
+  void halveWhole(double max, uint64_t most) {
+    for (uint32_t block = 0; block < blocks_.size(); ++block) {
+      if (!(bends_[block].deviation() > max)) continue;
+      for (const uint32_t of_class : classes_[block]) {
+        if (of_classes_[of_class] > 1) continue;
+        of_classes_[of_class] = 2;
+        if (nodes() > most) of_classes_[of_class] = 1;
+      }
+    }
+  }
+
+  Refinement chosen() const {
     std::vector<CellCuts> of_blocks;
     for (uint32_t block = 0; block < blocks_.size(); ++block) of_blocks.push_back(cutsOf(block));
     return Refinement(std::move(of_blocks));
@@ -231,6 +250,11 @@ class CutChoice {
   CellCuts cutsOf(uint32_t block) const {
     const std::array<uint32_t, 3>& classes = classes_[block];
     return {of_classes_[classes[0]], of_classes_[classes[1]], of_classes_[classes[2]]};
+  }
+  uint64_t nodes() const {
+    uint64_t sum = 0;
+    for (uint32_t block = 0; block < blocks_.size(); ++block) sum += nodesOf(blocks_[block], cutsOf(block));
+    return sum;
   }
   double squareOf(uint32_t block, const CellCuts& cuts) const {
     const double deviation = bends_[block].deviation(cuts);
@@ -314,13 +338,18 @@ Refinement refinementByNeed(const GridSource& source) {
   const uint64_t nodes = nodesOf(blocks);
   if (nodes > kMaxCutByNeed) return {};
   const std::vector<BlockBends> bends = measureBends(source, kSampledNodes);
-  const bool small = nodes <= kSmallGrid && deviationOf(bends) > kMaxDeviationOfSmall;
+  const double deviation = deviationOf(bends);
+  const bool small = nodes <= kSmallGrid && deviation > kMaxDeviationOfSmall;
+  const bool tiny = nodes <= kTinyGrid && blocks.size() > 1 && deviation > kMaxDeviationOfTiny;
   const double max = small ? kMaxDeviationOfSmall : kMaxDeviation;
   const bool shows =
       std::ranges::any_of(bends, [max](const BlockBends& of_block) { return of_block.deviation() > max; });
-  if (!shows) return {};
+  if (!shows && !tiny) return {};
   const uint64_t most = nodes > kLargeGrid ? nodes + nodes / 2 : 8 * nodes;
-  return CutChoice(blocks, bends, joinedAxes(source), max).run(most);
+  CutChoice choice(blocks, bends, joinedAxes(source), max);
+  choice.cutByNeed(most);
+  if (tiny) choice.halveWhole(kMaxDeviationOfTiny, most);
+  return choice.chosen();
 }
 
 std::string noteOnCells(const GridSource& source, bool by_need) {

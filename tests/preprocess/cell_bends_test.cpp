@@ -162,6 +162,27 @@ TEST(RefinementByNeed, JoinedRowsAreCutAlike) {
   EXPECT_EQ(found.ofBlock(2), kWholeCells);
 }
 
+TEST(RefinementByNeed, HalvesAllCellsOfFewThatMeetAtAnAngle) {
+  // A herringbone of blocks that taper, and a straight one: what joints add is not measured.
+  const auto grid = [](uint64_t along) {
+    return gridOf({gridBlock(along, 8, 7), gridBlock(along, 8, 7), gridBlock(6, 6, 6)},
+                  [](const glm::dvec3& n, uint32_t block) {
+                    if (block == 2) return n + glm::dvec3(0, 100, 0);
+                    const double side = block == 0 ? 1 : -1;
+                    return glm::dvec3(side * n.x, n.y + 0.8 * n.x, n.z * (1 + 0.3 * n.y));
+                  });
+  };
+  const auto few = grid(6), many = grid(200);
+  const double deviation = measureBends(*few, kAll).at(0).deviation();
+  EXPECT_GT(deviation, 0.3);
+  EXPECT_LT(deviation, 0.6);
+  const Refinement found = refinementByNeed(*few);
+  EXPECT_EQ(found.ofBlock(0), (CellCuts{2, 2, 2}));
+  EXPECT_EQ(found.ofBlock(1), (CellCuts{2, 2, 2}));
+  EXPECT_EQ(found.ofBlock(2), kWholeCells);
+  EXPECT_FALSE(refinementByNeed(*many).cutsCells());
+}
+
 TEST(RefinementByNeed, KeepsToItsBounds) {
   // Cells that no cut makes even.
   const auto wild =
@@ -188,7 +209,7 @@ TEST(RefinementByNeed, KeepsToItsBounds) {
   EXPECT_FALSE(refinementByNeed(*too_large).cutsCells());
 }
 
-TEST(RefinementByNeed, HasTheSameBytesForAnyThreadsAndMemory) {
+TEST(RefinementByNeed, HasTheSameBytesForAnyThreadsMemoryAndRanks) {
   const auto grid = refined(ringAndBlocks(), refinementByNeed(*ringAndBlocks()));
   const TemporaryFolder folder;
   ConvertOptions options;
@@ -196,7 +217,10 @@ TEST(RefinementByNeed, HasTheSameBytesForAnyThreadsAndMemory) {
   options.scalars = {0};
   options.threads = 1;
   options.overwrite = true;
-  expectSameCaches(*grid, options, {{.threads = 2, .bucket_splats = 500, .slab_bytes = 40'000}});
+  expectSameCaches(*grid, options,
+                   {{.threads = 2, .bucket_splats = 500, .slab_bytes = 40'000},
+                    {.bucket_splats = 500, .slab_bytes = 40'000, .ranks = 2},
+                    {.bucket_splats = 500, .slab_bytes = 40'000, .ranks = 3}});
 }
 
 }  // namespace
