@@ -77,7 +77,7 @@ void drawArrow(cairo_t* cairo, const glm::dvec2& from, const glm::dvec2& to, dou
   cairo_fill(cairo);
 }
 
-/// Where the arrow of an axis begins and ends, and where its name stands, in pixels.
+/// The places where the arrow of an axis begins and ends and where its name stands, in pixels.
 struct AxisArrow {
   glm::dvec2 from, to, name;
 };
