@@ -106,7 +106,9 @@ class Conversion {
   void runPasses(std::span<const Pass> passes) {
     for (const Pass& pass : passes) {
       const TraceScope trace(pass.name, TraceKind::kStage);
-      progress_.begin(pass.name, pass.steps / ranks_.count(), pass.unit);
+      // Cells of one layer are two splats.
+      const uint64_t built = pass.run == &Conversion::build ? splats_.tree[0].contents.splats : 0;
+      progress_.begin(pass.name, std::max(pass.steps, built) / ranks_.count(), pass.unit);
       (this->*pass.run)();
       // What a pass has freed goes back to the system: the next one counts on it.
       returnFreedMemory();

@@ -43,7 +43,7 @@ namespace {
 using nlohmann::json;
 
 // To be raised when the journal, temporary files or the bricks of a grid change.
-constexpr int kJournalVersion = 7;
+constexpr int kJournalVersion = 8;
 constexpr uint64_t kLargestJournal = uint64_t{1} << 30;
 
 std::string checksumLine(const std::string& text) {

@@ -228,15 +228,18 @@ DiskNeeds likelyNeeds(const UncheckedConversion& conversion, const DiskNeeds& mo
 void checkDiskOf(const UncheckedConversion& conversion, Progress& progress) {
   const auto& [options, origin, nodes, workspace, estimate] = conversion;
   if (!options.check_disk_space) return;
-  const DiskNeeds most = diskNeeds(nodes, options.scalars.size());
+  const auto needsOf = [&, splats = nodes](const TemporaryNeeds& temporary) {
+    return diskNeeds(std::max(splats, temporary.splats), options.scalars.size());
+  };
   const TemporaryNeeds most_temporary =
       workspace.hasAllSplats() ? TemporaryNeeds{} : origin.mostTemporaryNeeds();
   const std::filesystem::path folder = temporaryFolder(options);
-  if (hasDiskSpace(leftOf(conversion, most, most_temporary), options.output, folder)) return;
+  if (hasDiskSpace(leftOf(conversion, needsOf(most_temporary), most_temporary), options.output, folder))
+    return;
   const TemporaryNeeds forecast =
       workspace.hasAllSplats() ? TemporaryNeeds{} : origin.temporaryNeeds(progress);
-  checkDiskSpace(leftOf(conversion, likelyNeeds(conversion, most), forecast), options.output, folder,
-                 options.full_disk_hint.empty() ? kSmallDiskHint : options.full_disk_hint);
+  checkDiskSpace(leftOf(conversion, likelyNeeds(conversion, needsOf(forecast)), forecast), options.output,
+                 folder, options.full_disk_hint.empty() ? kSmallDiskHint : options.full_disk_hint);
 }
 
 }  // namespace curvisplat

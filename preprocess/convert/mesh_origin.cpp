@@ -33,14 +33,16 @@ MeshOrigin::MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars,
 }
 
 void MeshOrigin::follow(const Manifest& cache) {
-  slabs_ = cache.blocks.front().nk == 2 ? SlabCells::kHalved : SlabCells::kWhole;
-  blocks_.front().nk = slabs_ == SlabCells::kHalved ? 2 : 1;
+  const bool halved = cache.cells && centring() == Centring::kCell && cache.blocks.size() == 1 &&
+                      cache.blocks.front().nj == 1 && cache.blocks.front().nk == 2;
+  slabs_ = halved ? SlabCells::kHalved : SlabCells::kWhole;
+  blocks_.front().nk = halved ? 2 : 1;
 }
 
 TemporaryNeeds MeshOrigin::needsBy(const NeedsOf& needs_of) const {
   const MeshReader positions(reader_.source(), {}, std::nullopt);
   const GatherNeeds gather = needs_of(positions, {centring(), reader_.scalars(), plan_.mesh_bytes});
-  TemporaryNeeds needs{gather.before_splats, gather.beside_splats, 0};
+  TemporaryNeeds needs{gather.before_splats, gather.beside_splats, 0, gather.splats};
   if (preparation_.values == 0) return needs;
   const GatherNeeds of_values =
       needs_of(positions, {preparation_.centring, preparation_.fields, plan_.mesh_bytes});
@@ -96,7 +98,7 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
   // Cells lie where points do, about. A point that several pieces or elements have counts once.
   const bool cells = centring() == Centring::kCell;
   const uint64_t points_counted = reader_.points() - numbers_->merged();
-  const uint64_t each = cells ? drawn_cells_ / std::max<uint64_t>(1, points_counted) + 1 : 1;
+  const uint64_t each = cells ? 2 * drawn_cells_ / std::max<uint64_t>(1, points_counted) + 1 : 1;
   const MeshReader positions(reader_.source(), {}, std::nullopt);
   std::vector<uint64_t> numbers;
   positions.forEachPoints([&](const LoadedPoints& loaded) {

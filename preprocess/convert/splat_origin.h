@@ -44,6 +44,7 @@ struct TemporaryNeeds {
   uint64_t before_splats = 0,
            beside_splats = 0;  // until the first splat is made, and from there until the last one
   uint64_t lasting = 0;        // until the cache is done
+  uint64_t splats = 0;         // at the most, where they may be more than the samples
 };
 
 /// Cells of each handedness.

@@ -305,7 +305,7 @@ GatherNeeds GatherCounts::needsOfPoints() const {
   const uint64_t planes_bytes = faces.corners_of_outer * OuterPlanes::bytesOfPlane();
   const uint64_t spilled_bytes = faces.spilled * FaceMatcher::spilledBytes(PointBorders::faceBytes());
   const uint64_t border_bytes = sums_.border_bytes / 2;
-  needs.samples = points_;
+  needs.splats = points_;
   const uint64_t summed = sum_file_bytes +
                           StreamsFile::bytesInFile(waiting_bytes, ranges, sums_.cell_bytes()) +
                           StreamsFile::bytesInFile(spilled_bytes, 1, FaceMatcher::streamBytes(border_bytes));
@@ -331,7 +331,7 @@ GatherNeeds GatherCounts::needsOfCells() const {
   const WaitingFaces::Counts::Pairs all{faces.found.in_range + faces.found_late.in_range,
                                         faces.found.across + faces.found_late.across};
   GatherNeeds needs;
-  needs.samples = cells;
+  needs.splats = cells + std::min(cells, faces.outer / 2);
   needs.beside_splats =
       bodies + ofPairs(all) + inFile(faces.outer * OuterPlanes::bytesOfPlane(), slopes_.plane_bytes);
   // The last faces are matched before the first splat.

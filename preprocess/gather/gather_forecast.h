@@ -84,7 +84,7 @@ struct GatherJob {
 struct GatherNeeds {
   uint64_t before_splats = 0;  // while cells are gathered
   uint64_t beside_splats = 0;  // from the first splat on
-  uint64_t samples = 0;        // points, or cells that are drawn
+  uint64_t splats = 0;         // one a point or cell; two a cell that may have two outer faces (halveSlab())
 };
 
 /// The most that may be needed, whatever the order of the cells. Reads a few chunks of them; `reader` needs

@@ -167,37 +167,50 @@ constexpr double kSimilar = 0.7;  // cosine: of one plane
 constexpr double kEven = 0.9;     // the length of a mean of unit vectors that are about the same
 constexpr size_t kMaxDirections = 16;
 
-/// The planes that touch, or do not, similar ones as one. A prism may have more sides than VoxelPlanes: then
-/// those that are not closed, the largest first.
-VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
+/// The planes of a cell or of the cells at a point, those of similar directions as one.
+struct Directions {
   std::array<VoxelPlanes::Plane, kMaxDirections> places;
   size_t count = 0;
+
+  std::span<const VoxelPlanes::Plane> all() const { return std::span(places).first(count); }
+};
+
+/// Those that touch, or do not.
+Directions directionsOf(std::span<const OuterPlane> planes, bool touching) {
+  Directions found;
   for (const OuterPlane& plane : planes) {
     if (plane.touches != touching) continue;
     const double area = glm::length(plane.inward);
     VoxelPlanes::Plane* same = nullptr;
-    for (size_t n = 0; n < count && !same; ++n) {
-      const glm::dvec3& sum = places[n].inward;
-      if (glm::dot(sum, plane.inward) > kSimilar * glm::length(sum) * area) same = &places[n];
+    for (size_t n = 0; n < found.count && !same; ++n) {
+      const glm::dvec3& sum = found.places[n].inward;
+      if (glm::dot(sum, plane.inward) > kSimilar * glm::length(sum) * area) same = &found.places[n];
     }
     if (!same) {
-      if (count == kMaxDirections) continue;
-      same = &places[count++];
+      if (found.count == kMaxDirections) continue;
+      same = &found.places[found.count++];
       *same = {glm::dvec3(0.0), glm::dvec3(0.0), 0, 0, true};
     }
     same->inward += plane.inward;
     same->point += area * plane.point;
     same->area += area;
   }
-  const std::span<VoxelPlanes::Plane> all = std::span(places).first(count);
-  for (VoxelPlanes::Plane& plane : all) {
+  for (VoxelPlanes::Plane& plane : std::span(found.places).first(found.count)) {
     const double length = glm::length(plane.inward);
     plane.face = length > kEven * plane.area;
     plane.inward /= length;
     plane.point /= plane.area;
   }
+  return found;
+}
+
+/// The planes that touch, or do not, similar ones as one. A prism may have more sides than VoxelPlanes: then
+/// those that are not closed, the largest first.
+VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
+  const Directions directions = directionsOf(planes, touching);
+  const std::span<const VoxelPlanes::Plane> all = directions.all();
   std::array<VoxelPlanes::Plane, kMaxDirections> kept;
-  auto end = count > VoxelPlanes::kMax
+  auto end = all.size() > VoxelPlanes::kMax
                  ? std::copy_if(all.begin(), all.end(), kept.begin(),
                                 [&](const VoxelPlanes::Plane& plane) { return !isClosed(plane, all); })
                  : std::copy(all.begin(), all.end(), kept.begin());
@@ -217,7 +230,8 @@ VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
 bool halveSlab(std::span<const OuterPlane> planes, const NodeSplat& whole,
                std::span<const SplatScalar> values, std::array<SlabHalf, 2>& halves) {
   if (planes.size() < 2 || !(whole.splat.weight > 0)) return false;
-  const std::optional<glm::dvec3> q = acrossPlate(joined(planes, true), whole.splat.position, whole.splat);
+  const std::optional<glm::dvec3> q =
+      acrossPlate(directionsOf(planes, true).all(), whole.splat.position, whole.splat);
   if (!q) return false;
   const glm::dvec3 along = whole.splat.factor() * *q, normal = glm::normalize(gradientOf(whole.splat, *q));
   const glm::dmat3 factor = whole.splat.factor();

@@ -90,13 +90,13 @@ VoxelPlanes MergedFaces::of(size_t voxel) const {
   return found;
 }
 
-std::optional<glm::dvec3> acrossPlate(const VoxelPlanes& planes, const glm::dvec3& position,
+std::optional<glm::dvec3> acrossPlate(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
                                       const Splat& splat) {
   constexpr double kParallel = -0.9, kCovered = 0.6, kThinner = 0.75, kThicker = 1.33;
-  for (size_t n = 0; n < planes.count; ++n) {
-    const auto& a = planes.planes[n];
+  for (size_t n = 0; n < planes.size(); ++n) {
+    const auto& a = planes[n];
     for (size_t m = 0; m < n; ++m) {
-      const auto& b = planes.planes[m];
+      const auto& b = planes[m];
       const double apart = glm::dot(a.inward, position - a.point) + glm::dot(b.inward, position - b.point);
       const double cosine = glm::dot(a.inward, b.inward);
       if (!(a.face && b.face && cosine < kParallel)) continue;
@@ -135,7 +135,8 @@ uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position,
     faces[at] = face;
   }
   if (count == 0) {
-    const std::optional<glm::dvec3> across = acrossPlate(planes, position, merged);
+    const std::optional<glm::dvec3> across =
+        acrossPlate(std::span(planes.planes).first(planes.count), position, merged);
     return across ? packPlateCode(*across) : kNoBorder;
   }
   std::array<glm::dvec3, 3> axes;

@@ -75,7 +75,7 @@ class MergedFaces {
 
 /// The unit vector, in the splat's frame, from one to the other of two opposite faces that the splat fills the room between; nullopt if
 /// there are none.
-std::optional<glm::dvec3> acrossPlate(const VoxelPlanes& planes, const glm::dvec3& position,
+std::optional<glm::dvec3> acrossPlate(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
                                       const Splat& splat);
 
 /// The border code of a merged splat. `position`: as in VoxelMerger::add(). `voxel_size`: the least length of

@@ -228,7 +228,9 @@ class MeshCut {
       return from + static_cast<float>(part) * (to - from);
     };
     mesh_.positions.push_back(mixed(mesh_.positions[a], mesh_.positions[b]));
-    mesh_.normals.push_back(mixed(mesh_.normals[a], mesh_.normals[b]));
+    const glm::vec3 normal = mesh_.normals[a];  // of either side
+    mesh_.normals.push_back(
+        mixed(normal, glm::dot(normal, mesh_.normals[b]) < 0 ? -mesh_.normals[b] : mesh_.normals[b]));
     if (!mesh_.scalars.empty()) mesh_.scalars.push_back(mixed(mesh_.scalars[a], mesh_.scalars[b]));
     inside_.push_back(0);
     return static_cast<uint32_t>(mesh_.positions.size() - 1);

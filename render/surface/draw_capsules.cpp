@@ -124,8 +124,10 @@ HWY_INLINE void setUp(const CapsuleLook& look, const SampleBox& box, size_t n, S
   hn::Store(end, d, s.length.at + n);
   if (kPerspective && !look.in_pixels) {
     const V nearest = hn::Set(d, look.nearest);
-    hn::Store(hn::IfThenElseZero(hn::Eq(av, nearest), hn::Neg(endless)), d, s.begin.at + n);
-    hn::Store(hn::IfThenElse(hn::Eq(bv, nearest), endless, end), d, s.end.at + n);
+    const auto cut_a = hn::And(has_length, hn::Eq(av, nearest)),
+               cut_b = hn::And(has_length, hn::Eq(bv, nearest));
+    hn::Store(hn::IfThenElseZero(cut_a, hn::Neg(endless)), d, s.begin.at + n);
+    hn::Store(hn::IfThenElse(cut_b, endless, end), d, s.end.at + n);
   } else {
     hn::Store(hn::Zero(d), d, s.begin.at + n);
     hn::Store(end, d, s.end.at + n);

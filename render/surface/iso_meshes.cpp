@@ -40,7 +40,7 @@ uint64_t IsoMeshes::bytes(const Manifest& manifest, bool two_scalars, size_t val
 
 const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& wanted,
                                        const std::function<void()>& throw_if_stopped) {
-  if (!canBeOf(cache.manifest())) return nullptr;
+  if (!canBeOf(cache.manifest()) || has_lost_seams_) return nullptr;
   if (of_ != wanted) {
     const bool has_nodes = of_ && of_->variable == wanted.variable && of_->other == wanted.other;
     meshes_.reset();
@@ -51,6 +51,7 @@ const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& w
       nodes_.emplace(cache, wanted.variable, wanted.other, wanted.keep_going, throw_if_stopped);
     }
     damaged_ = nodes_->damaged();
+    has_lost_seams_ = !nodes_->areComplete() && damaged_.empty();
     if (nodes_->areComplete())
       contour(wanted);
     else
@@ -83,6 +84,7 @@ void IsoMeshes::release() {
   meshes_.reset();
   damaged_.clear();
   of_.reset();
+  has_lost_seams_ = false;
 }
 
 IsoSurfaces isoSurfaces(const IsoMeshes::Meshes& meshes, const SurfaceScene& scene, bool two_scalars,

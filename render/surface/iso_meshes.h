@@ -60,6 +60,7 @@ class IsoMeshes {
   std::optional<Wanted> of_;  // that the nodes and the meshes are of
   std::optional<Meshes> meshes_;
   std::map<uint32_t, std::string> damaged_;
+  bool has_lost_seams_ = false;  // nodes that blocks share are not found, whichever scalar is asked for
 };
 
 /// The meshes as surfaces of a scene, and the value of each; those that nothing is seen of are left out. `two_scalars`: of the picture.

@@ -30,6 +30,9 @@ Derivative ofParabola(const std::array<Derivative, 2>& to, const std::array<doub
   return {of_a * to[0].place + of_b * to[1].place, of_a * to[0].value + of_b * to[1].value};
 }
 
+// A place of more nodes is a pole, where the grid has collapsed: none of them knows a gradient.
+constexpr std::ptrdiff_t kMaxShared = 64;
+
 }  // namespace
 
 NodeGradients::NodeGradients(const GridNodes& nodes) : nodes_(nodes) {
@@ -52,10 +55,13 @@ bool NodeGradients::isShared(size_t node) const {
 
 glm::dvec3 NodeGradients::at(size_t node) const {
   const size_t one = representative(node);
-  Weighted sum = ofOne(one);
   auto other = std::lower_bound(by_same_.begin(), by_same_.end(), one,
                                 [](const JoinedNode& joined, size_t same) { return joined.same < same; });
-  for (; other != by_same_.end() && other->same == one; ++other) {
+  const auto end = std::upper_bound(other, by_same_.end(), one,
+                                    [](size_t same, const JoinedNode& joined) { return same < joined.same; });
+  if (end - other > kMaxShared) return glm::dvec3(0.0);
+  Weighted sum = ofOne(one);
+  for (; other != end; ++other) {
     const Weighted of_other = ofOne(other->node);
     sum.gradient += of_other.gradient;
     sum.weight += of_other.weight;

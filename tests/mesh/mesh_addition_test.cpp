@@ -78,6 +78,10 @@ class MeshAddition : public testing::Test {
       a.readVariable(brick, variable_of_a, values_a);
       b.readVariable(brick, variable_of_b, values_b);
       ASSERT_EQ(values_a.mean, values_b.mean) << "brick " << brick;
+      ASSERT_EQ(values_a.slope0, values_b.slope0) << "brick " << brick;
+      ASSERT_EQ(values_a.slope1, values_b.slope1) << "brick " << brick;
+      ASSERT_EQ(values_a.slope2, values_b.slope2) << "brick " << brick;
+      ASSERT_EQ(values_a.variance, values_b.variance) << "brick " << brick;
     }
   }
 

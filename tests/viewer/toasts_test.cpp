@@ -46,7 +46,8 @@ TEST(Reports, SayWhereTheOptionsAre) {
   const std::string backend = "no memory is left; give --backend cpu";
   EXPECT_EQ(inWindowsWords(backend), backend + " (an option of \"curvisplat view\" in a terminal)");
   EXPECT_EQ(inWindowsWords("ask for a smaller --size"), "ask for a smaller size");
-  for (const char* plain : {"a.xyz: is truncated", "wing--fine.cgns: cannot be read", "a -- b", "--"})
+  for (const char* plain : {"--surface walls names no face", "a.xyz: is truncated",
+                            "wing--fine.cgns: cannot be read", "a -- b", "--"})
     EXPECT_EQ(inWindowsWords(plain), plain);
 }
 

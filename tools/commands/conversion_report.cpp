@@ -120,15 +120,16 @@ Forecast forecastOfMesh(const MeshSource& mesh, const ConvertOptions& options) {
   forecast.samples = origin.blocks().front().ni;
   plan.suit(forecast.samples, options.scalars.size());
   forecast.threads = plan.threads;
+  const TemporaryNeeds temporary = origin.temporaryNeeds(progress);
+  const uint64_t splats = std::max(forecast.samples, temporary.splats);
   const ConversionEstimate estimate =
-      estimateConversion(forecast.samples, plan.threads,
+      estimateConversion(splats, plan.threads,
                          origin.centring() == Centring::kCell ? SplatsOf::kMeshCells : SplatsOf::kMeshPoints);
-  const DiskNeeds needs =
-      with(origin.temporaryNeeds(progress), diskNeeds(forecast.samples, options.scalars.size()));
+  const DiskNeeds needs = with(temporary, diskNeeds(splats, options.scalars.size()));
   forecast.cache_bytes =
       estimate.cache_bytes + (options.scalars.size() - 1) * estimate.bytes_per_further_scalar;
   forecast.temporary_bytes = needs.mostTemporary();
-  forecast.memory_bytes = plan.expectedPeak(forecast.samples, options.scalars.size());
+  forecast.memory_bytes = plan.expectedPeak(splats, options.scalars.size());
   forecast.seconds = estimate.seconds;
   return forecast;
 }

@@ -354,8 +354,10 @@ class FrameRun {
       if (reported_unreadable_.insert(failure.brick).second && !first) first = &failure;
     if (!first) return;
     progress_.end();
+    // Isosurfaces in cells read all leaves, also those that the picture does not need.
+    const size_t unreadable = statistics.bricks_unreadable.size();
     printMessage("warning: {} of {} bricks{} cannot be read; they are drawn coarser or left out: {}",
-                 statistics.bricks_unreadable.size(), statistics.bricks_drawn, which, first->reason);
+                 unreadable, std::max<uint64_t>(statistics.bricks_drawn, unreadable), which, first->reason);
   }
 
   const RenderArguments& arguments_;

@@ -153,7 +153,7 @@ nlohmann::json statisticsOf(const RenderReport& report) {
     json["light"]["shadow"] = light->shadow;
     json["light"]["ambient_occlusion"] = light->ambient_occlusion;
   }
-  const glm::vec4& background = options.background;
+  const glm::vec4& background = report.background;
   json["background"] = {background.r, background.g, background.b, background.a};
   json["transfer_function"] = toJson(report.function());
   if (report.colour_variable) {

@@ -68,8 +68,10 @@ CameraArguments placedAbove(const CameraArguments& arguments, const std::optiona
     north = unit.column(degrees[0], degrees[1] + 90);
   }
   const auto text = [](const glm::dvec3& v) { return fmt::format("{},{},{}", v.x, v.y, v.z); };
+  // The height is that above a globe which is drawn larger or smaller, but not that of exaggerated depths.
+  const glm::dvec3 of_height = globe->sphere() ? scale : glm::dvec3(1, 1, std::sqrt(scale.x * scale.y));
   CameraArguments placed = arguments;
-  placed.position = text(scale * ground + height * up);
+  placed.position = text(scale * ground + of_height * (height * up));
   placed.focal_point = text(scale * ground);
   placed.view_up = text(scale * north);
   if (!placed.view_angle && !placed.parallel_scale) placed.view_angle = kViewAngle;

@@ -101,10 +101,21 @@ bool isWall(const FaceRegion& region) {
   return region.type.starts_with("BCWall");
 }
 
-/// The parts of a grid without boundary conditions where its flow rests.
+/// The parts of a grid without boundary conditions where its flow rests: in the last step, since all of it may rest in the first.
 std::vector<GridSurface::Part> wallsByFlow(const CacheReader& cache, const FacesReader& faces) {
-  return stillParts(cache.manifest(), faces,
-                    [&](const std::string& scalar) { return facesWith(scalar, cache); });
+  const uint64_t last = cache.series().steps.size() - 1;
+  const CacheReader at_last = cache.atStep(last);
+  return stillParts(at_last.manifest(), faces,
+                    [&](const std::string& scalar) { return facesWith(scalar, at_last); });
+}
+
+/// Whether it has such parts. Damaged faces have none: an error says so where they are drawn.
+bool hasWallsByFlow(const CacheReader& cache, const FacesReader& faces) {
+  try {
+    return !wallsByFlow(cache, faces).empty();
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 /// Lists the faces of the cache, for messages.
@@ -373,8 +384,7 @@ std::vector<std::string> faceNamesOf(const CacheReader& cache) {
   }
   std::sort(names.begin(), names.end());
   if (names.size() > 1) names.insert(names.begin(), "all");
-  if (std::any_of(faces->regions().begin(), faces->regions().end(), isWall) ||
-      !wallsByFlow(cache, *faces).empty())
+  if (std::any_of(faces->regions().begin(), faces->regions().end(), isWall) || hasWallsByFlow(cache, *faces))
     add(names, "walls");
   if (has_blanks) add(names, kBlanks);
   // A comma is taken for the end of a name.

@@ -6,6 +6,8 @@
 #include <initializer_list>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
@@ -56,7 +58,10 @@ Flow flowOf(const Manifest& manifest, const FacesReader& like, const FacesWith& 
         const auto faces = faces_with(info.name);
         const auto scalar = faces ? faces->scalarOf(info.number) : std::nullopt;
         if (!scalar || faces->patches().size() != like.patches().size()) return {};
-        flow.components.push_back({faces, *scalar});
+        // Scalars of one file are read together.
+        const bool is_same =
+            !flow.components.empty() && flow.components.back().faces->path() == faces->path();
+        flow.components.push_back({is_same ? flow.components.back().faces : faces, *scalar});
         flow.zero = std::max({flow.zero, kZero * std::abs(info.min), kZero * std::abs(info.max)});
       } catch (const Error&) {
         return {};  // faces of an earlier version, without these values: nothing is known of their flow
@@ -67,32 +72,43 @@ Flow flowOf(const Manifest& manifest, const FacesReader& like, const FacesWith& 
   return {};
 }
 
-/// [node of the patch]: whether it is at rest.
-std::vector<uint8_t> nodesAtRest(const Flow& flow, uint32_t patch) {
-  std::vector<uint8_t> rests;
+struct RestingNodes {
+  std::vector<uint8_t> rests;  // [node of the patch]
+  std::vector<uint8_t> quads;  // PatchNodes::quads
+};
+
+RestingNodes nodesAtRest(const Flow& flow, uint32_t patch) {
+  RestingNodes nodes;
+  const FacesReader* read_from = nullptr;
+  PatchNodes read;
   for (const Component& one : flow.components) {
-    const std::vector<float> values = one.faces->read(patch).scalars.at(one.scalar);
-    rests.resize(values.size(), 1);
+    if (read_from != one.faces.get()) read = one.faces->read(patch);
+    read_from = one.faces.get();
+    const std::vector<float>& values = read.scalars.at(one.scalar);
+    nodes.rests.resize(values.size(), 1);
     for (size_t n = 0; n < values.size(); ++n)
-      if (!(std::abs(static_cast<double>(values[n])) <= flow.zero)) rests[n] = 0;
+      if (!(std::abs(static_cast<double>(values[n])) <= flow.zero)) nodes.rests[n] = 0;
   }
-  return rests;
+  nodes.quads = std::move(read.quads);
+  return nodes;
 }
 
 bool anyAtRest(const Flow& flow, const GridFace& face) {
   if (face.side == FaceSide::kPlane || face.root == kNoPatch) return false;
-  const std::vector<uint8_t> rests = nodesAtRest(flow, face.root);
+  const std::vector<uint8_t> rests = nodesAtRest(flow, face.root).rests;
   return std::ranges::find(rests, 1) != rests.end();
 }
 
 /// The rectangle of a face's cells whose four nodes are at rest; none if others fill more than a tenth of it.
 class RestingCells {
  public:
-  void add(const GridFace& face, const FacePatch& patch, const std::vector<uint8_t>& rests) {
+  void add(const GridFace& face, const FacePatch& patch, const RestingNodes& nodes) {
+    const auto& [rests, quads] = nodes;
     const size_t across = patch.nodes[0];
     for (uint64_t v = 0; v + 1 < patch.nodes[1]; ++v)
       for (uint64_t u = 0; u + 1 < across; ++u) {
         const size_t at = v * across + u;
+        if (!quads[v * (across - 1) + u]) continue;  // blanked, or another block goes on there
         if (!(rests[at] && rests[at + 1] && rests[at + across] && rests[at + across + 1])) continue;
         const std::array<uint64_t, 2> node{latticeIndex(face, patch, 0, u), latticeIndex(face, patch, 1, v)};
         for (size_t along = 0; along < 2; ++along) {
@@ -121,7 +137,7 @@ std::vector<GridSurface::Part> stillParts(const Manifest& manifest, const FacesR
                                           const FacesWith& faces_with) {
   const Flow flow = flowOf(manifest, faces, faces_with);
   std::vector<GridSurface::Part> parts;
-  if (flow.components.empty()) return parts;
+  if (flow.components.empty() || flow.zero == 0) return parts;  // of a flow without motion nothing is known
   for (uint32_t n = 0; n < faces.faces().size(); ++n) {
     const GridFace& face = faces.faces()[n];
     if (!anyAtRest(flow, face)) continue;

@@ -143,9 +143,13 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
   if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragged_.reset();
   const bool mouse_moved = ImGui::GetIO().MouseDelta.x != 0 || ImGui::GetIO().MouseDelta.y != 0;
   if (dragged_ && mouse_moved) {
-    if (ImGui::GetIO().KeyShift)
-      function.movePointsTogether(canvas.xOf(mouse) - function.points()[*dragged_].x);
-    else
+    if (ImGui::GetIO().KeyShift) {
+      // The ends stay where they are.
+      const bool is_end = *dragged_ == 0 || *dragged_ + 1 == function.points().size();
+      const auto from = is_end ? canvas.xOf({mouse.x - ImGui::GetIO().MouseDelta.x, mouse.y})
+                               : function.points()[*dragged_].x;
+      function.movePointsTogether(canvas.xOf(mouse) - from);
+    } else
       function.movePoint(*dragged_, canvas.xOf(mouse), opacityAt(canvas.heightAt(mouse)));
     changed = true;
   }

@@ -41,7 +41,9 @@ std::string inWindowsWords(const std::string& message) {
   if (const size_t at = text.find(kSize); at != text.npos) text.replace(at, kSize.size(), "size");
   for (size_t at = text.find("--"); at != text.npos; at = text.find("--", at + 2)) {
     if (!isOptionAt(text, at)) continue;
-    const bool of_drawing = text.compare(at, 9, "--backend") == 0 || text.compare(at, 6, "--card") == 0;
+    const auto is = [&](std::string_view option) { return text.compare(at, option.size(), option) == 0; };
+    if (is("--surface") || is("--scalar") || is("--iso")) continue;  // which the window has, by other names
+    const bool of_drawing = is("--backend") || is("--card");
     return text +
            (of_drawing
                 ? " (an option of \"curvisplat view\" in a terminal)"
