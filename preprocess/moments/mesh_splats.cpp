@@ -175,7 +175,7 @@ struct Directions {
   std::span<const VoxelPlanes::Plane> all() const { return std::span(places).first(count); }
 };
 
-/// Those that touch, or do not.
+/// Joins planes of similar directions: of those that touch, or of those that do not.
 Directions directionsOf(std::span<const OuterPlane> planes, bool touching) {
   Directions found;
   for (const OuterPlane& plane : planes) {
