@@ -231,7 +231,7 @@ bool halveSlab(std::span<const OuterPlane> planes, const NodeSplat& whole,
                std::span<const SplatScalar> values, std::array<SlabHalf, 2>& halves) {
   if (planes.size() < 2 || !(whole.splat.weight > 0)) return false;
   const std::optional<glm::dvec3> q =
-      acrossPlate(directionsOf(planes, true).all(), whole.splat.position, whole.splat);
+      acrossLayer(directionsOf(planes, true).all(), whole.splat.position, whole.splat);
   if (!q) return false;
   const glm::dvec3 along = whole.splat.factor() * *q, normal = glm::normalize(gradientOf(whole.splat, *q));
   const glm::dmat3 factor = whole.splat.factor();

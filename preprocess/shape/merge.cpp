@@ -90,8 +90,13 @@ VoxelPlanes MergedFaces::of(size_t voxel) const {
   return found;
 }
 
-std::optional<glm::dvec3> acrossPlate(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
-                                      const Splat& splat) {
+namespace {
+
+/// Calls use(direction in the splat's frame, distance) for each two opposite faces that the splat fills the room between, until it
+/// returns true.
+template <typename Use>
+void forOppositeFaces(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
+                      const Splat& splat, const Use& use) {
   constexpr double kParallel = -0.9, kCovered = 0.6, kThinner = 0.75, kThicker = 1.33;
   for (size_t n = 0; n < planes.size(); ++n) {
     const auto& a = planes[n];
@@ -104,10 +109,35 @@ std::optional<glm::dvec3> acrossPlate(std::span<const VoxelPlanes::Plane> planes
       const double length = glm::length(across);
       if (!(apart > kThinner * length && apart < kThicker * length)) continue;
       if (!(std::min(a.area, b.area) * length > kCovered * splat.weight)) continue;
-      return across / length;
+      if (use(across / length, apart)) return;
     }
   }
-  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<glm::dvec3> acrossPlate(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
+                                      const Splat& splat) {
+  std::optional<glm::dvec3> found;
+  forOppositeFaces(planes, position, splat, [&](const glm::dvec3& across, double) {
+    found = across;
+    return true;
+  });
+  return found;
+}
+
+std::optional<glm::dvec3> acrossLayer(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
+                                      const Splat& splat) {
+  constexpr double kClearly = 1.5;
+  glm::dvec3 found(0.0);
+  double thickness = INFINITY, next = INFINITY;
+  forOppositeFaces(planes, position, splat, [&](const glm::dvec3& across, double apart) {
+    next = std::min(next, std::max(apart, thickness));
+    if (apart < thickness) found = across;
+    thickness = std::min(thickness, apart);
+    return false;
+  });
+  return thickness < INFINITY && next > kClearly * thickness ? std::optional(found) : std::nullopt;
 }
 
 uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged,

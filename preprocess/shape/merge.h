@@ -78,6 +78,11 @@ class MergedFaces {
 std::optional<glm::dvec3> acrossPlate(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
                                       const Splat& splat);
 
+/// The same for a cell with outer faces on many sides: across those that are clearly nearer to one another than any other two are, so
+/// that rounding does not decide; nullopt of a rod or a cube.
+std::optional<glm::dvec3> acrossLayer(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
+                                      const Splat& splat);
+
 /// The border code of a merged splat. `position`: as in VoxelMerger::add(). `voxel_size`: the least length of
 /// the splats behind it, in world units.
 uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position, const Splat& merged,

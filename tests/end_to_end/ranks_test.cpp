@@ -216,12 +216,12 @@ TEST_F(RanksCommand, CutCellsByNeedAlike) {
     return Words{"convert", file("cut.xyz"), file("cut.fun"), "--threads", "1", "--overwrite",
                  "-o",      file(name)};
   };
-  run(to("one.splats"));
-  EXPECT_NE(run({"info", file("one.splats")}).out.find("each cell of the files' grid is"), std::string::npos);
+  run(to("cut_by_one.splats"));
+  EXPECT_NE(run({"info", file("cut_by_one.splats")}).out.find("each cell of the files' grid is"), std::string::npos);
   for (const unsigned count : {2u, 3u}) {
     const ProgramResult shared = runAsRanks(count, to("cut.splats"));
     EXPECT_EQ(shared.status, 0) << shared.err;
-    Files expected = filesOf(file("one.splats")), found = filesOf(file("cut.splats"));
+    Files expected = filesOf(file("cut_by_one.splats")), found = filesOf(file("cut.splats"));
     expected.erase("manifest.json");  // their titles differ
     found.erase("manifest.json");
     EXPECT_TRUE(found == expected) << count;

@@ -66,6 +66,7 @@ class SlabCells : public ::testing::Test {
     MeshOrigin origin(mesh, {1}, std::nullopt, MemoryPlan::of(uint64_t{512} << 20, 1, 2), folder_.path());
     if (follow > 0) {
       Manifest manifest;
+      manifest.cells = true;
       manifest.blocks = {{"cells", 1, 1, follow}};
       origin.follow(manifest);
     }
@@ -140,6 +141,25 @@ TEST_F(SlabCells, OfSeveralLayersAreWhole) {
   EXPECT_EQ(halved_, 0u);
   converted(ArrayMesh({plate(5, 2)}), options());
   EXPECT_EQ(CacheReader(folder_ / "mesh.splats").manifest().blocks[0].nk, 1u);
+}
+
+/// Cells with outer faces all around, too; two faces of a rod are as near to one another as the others.
+TEST_F(SlabCells, OfARowAreHalvedAcrossTheThinSide) {
+  const auto row = [](double thickness) {
+    ArrayPiece piece;
+    for (uint64_t k = 0; k <= 1; ++k)
+      for (uint64_t j = 0; j <= 1; ++j)
+        for (uint64_t i = 0; i <= 4; ++i)
+          piece.points.emplace_back(static_cast<double>(i), static_cast<double>(j),
+                                    thickness * static_cast<double>(k));
+    for (uint64_t i = 0; i < 4; ++i)
+      piece.cells.append(CellKind::kHexahedron,
+                         std::array<uint64_t, 8>{i, i + 1, i + 6, i + 5, i + 10, i + 11, i + 16, i + 15});
+    setValues(piece, [](const glm::dvec3& x) { return x.x; });
+    return piece;
+  };
+  EXPECT_EQ(splatsOf(ArrayMesh({row(0.3)})).size(), 8u);
+  EXPECT_EQ(splatsOf(ArrayMesh({row(1)})).size(), 4u);
 }
 
 TEST_F(SlabCells, AreAsThoseOfTheCacheThatGetsAScalar) {

@@ -94,12 +94,14 @@ std::optional<std::array<double, TypedNumbers::kMax>> TypedNumbers::draw(const c
     typed_ = numbers;
   }
   if (field_ != id) return std::nullopt;
-  if (ImGui::IsItemActive()) return std::nullopt;
-  // Tab leaves one field in a frame, and enters the next in another.
-  if (!std::exchange(tabs_, false) && ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Tab), false)) {
-    tabs_ = true;
-    return std::nullopt;
-  }
+  // Tab leaves one field in a frame, perhaps that after the key, and enters the next in another.
+  constexpr int kFramesOfTab = 2;
+  const bool is_active = ImGui::IsItemActive();
+  if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Tab), false))
+    frames_ = kFramesOfTab + 1;
+  else if (is_active)
+    frames_ = 0;
+  if (is_active || (frames_ > 0 && --frames_ > 0)) return std::nullopt;
   field_ = 0;
   if (std::ranges::equal(values, std::span(typed_).first(values.size()))) return std::nullopt;
   return typed_;

@@ -34,7 +34,7 @@ class TypedNumbers {
  private:
   unsigned field_ = 0;  // that is typed into, by Dear ImGui's identifier
   std::array<double, kMax> typed_{};
-  bool tabs_ = false;  // the last frame: another of its fields may be entered now
+  int frames_ = 0;  // for which Tab may still be on its way to another of its fields
 };
 
 // Tests and scripts drive the window by the names of its widgets: if the environment has
