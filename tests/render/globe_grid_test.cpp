@@ -6,6 +6,7 @@
 
 #include "render/annotate/annotations.h"
 #include "render/camera/camera.h"
+#include "render/image/image.h"
 
 namespace curvisplat {
 namespace {
@@ -24,6 +25,11 @@ class GlobeGrid : public testing::Test {
     Annotations shown;
     shown.axes_grid = true;
     layer_ = annotationLayer(shown, scene_);
+    Image lines(size);
+    putBehind(lines, shown, scene_);
+    for (size_t n = 0; n < layer_.size(); n += 4)
+      for (size_t c = 0; c < 3; ++c)
+        if (lines.rgba[n + c] != scene_.background[static_cast<int>(c)]) layer_[n + 3] = 255;
   }
   /// Whether ink is within a pixel of a place.
   bool isInked(const glm::dvec3& place) const {

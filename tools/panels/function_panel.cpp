@@ -157,7 +157,7 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
   paintHeights(canvas);
   if (const auto shown = dragged_ ? dragged_ : near) {
     const OpacityPoint& point = function.points()[*shown];
-    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove; Shift + drag moves all",
+    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove\nShift + drag moves all",
                       function.scalarAt(point.x), point.opacity);
   } else if (over) {
     const double x = static_cast<double>(canvas.xOf(mouse));
