@@ -229,7 +229,7 @@ void checkDiskOf(const UncheckedConversion& conversion, Progress& progress) {
   const auto& [options, origin, nodes, workspace, estimate] = conversion;
   if (!options.check_disk_space) return;
   const auto needsOf = [&, splats = nodes](const TemporaryNeeds& temporary) {
-    return diskNeeds(std::max(splats, temporary.splats), options.scalars.size());
+    return diskNeeds(std::max(splats, temporary.splats), conversion.options.scalars.size());
   };
   const TemporaryNeeds most_temporary =
       workspace.hasAllSplats() ? TemporaryNeeds{} : origin.mostTemporaryNeeds();
