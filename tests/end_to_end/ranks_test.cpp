@@ -217,7 +217,8 @@ TEST_F(RanksCommand, CutCellsByNeedAlike) {
                  "-o",      file(name)};
   };
   run(to("cut_by_one.splats"));
-  EXPECT_NE(run({"info", file("cut_by_one.splats")}).out.find("each cell of the files' grid is"), std::string::npos);
+  EXPECT_NE(run({"info", file("cut_by_one.splats")}).out.find("each cell of the files' grid is"),
+            std::string::npos);
   for (const unsigned count : {2u, 3u}) {
     const ProgramResult shared = runAsRanks(count, to("cut.splats"));
     EXPECT_EQ(shared.status, 0) << shared.err;
