@@ -78,8 +78,8 @@ class MergedFaces {
 std::optional<glm::dvec3> acrossPlate(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
                                       const Splat& splat);
 
-/// The same for a cell with outer faces on many sides: across those that are clearly nearer to one another than any other two are, so
-/// that rounding does not decide; nullopt of a rod or a cube.
+/// Finds the same of a cell with outer faces on many sides, of which two must clearly be nearer to one another than any other two, so
+/// that rounding does not decide. Returns nullopt for a rod or a cube.
 std::optional<glm::dvec3> acrossLayer(std::span<const VoxelPlanes::Plane> planes, const glm::dvec3& position,
                                       const Splat& splat);
 

@@ -17,7 +17,7 @@ namespace curvisplat {
 /// behind them.
 Image globallySorted(const CacheReader& cache, const DrawnScalars& scalars, Backend backend,
                      const Camera& camera, const FrameOptions& options);
-/// The same of the cache's first variable.
+/// Draws the same of the cache's first variable.
 inline Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_function,
                             Backend backend, const Camera& camera, const FrameOptions& options) {
   return globallySorted(cache, DrawnScalars(0, transfer_function), backend, camera, options);

@@ -73,8 +73,8 @@ PixelLayers randomLayers(ImageSize size, uint32_t seed);
 /// The same splats in their order, each with light of its own.
 std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed);
 
-/// The same splats in their order, most of them thicker, and their scalar changes along the ray: they hide what is
-/// farther of themselves.
+/// Returns the same splats in their order. Most of them are thicker, and their scalar changes along the ray: they hide
+/// what is farther of themselves.
 std::vector<ScreenSplat> hidingSome(std::vector<ScreenSplat> splats, uint32_t seed);
 
 /// The same splats in their order, each with a ScreenColour.
