@@ -33,8 +33,8 @@ MeshOrigin::MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars,
 }
 
 void MeshOrigin::follow(const Manifest& cache) {
-  const bool halved = cache.cells && centring() == Centring::kCell && cache.blocks.size() == 1 &&
-                      cache.blocks.front().nj == 1 && cache.blocks.front().nk == 2;
+  const bool halved =
+      cache.isMesh() && cache.cells && centring() == Centring::kCell && cache.blocks[0].nk == 2;
   slabs_ = halved ? SlabCells::kHalved : SlabCells::kWhole;
   blocks_.front().nk = halved ? 2 : 1;
 }

@@ -132,10 +132,14 @@ glm::dvec3 Camera::usableViewUp() const {
   return usableUp(view_up, directionOf(*this));
 }
 
-glm::dmat4 Camera::viewFromWorld() const {
+ViewAxes Camera::axes() const {
   const glm::dvec3 forward = directionOf(*this);
   const glm::dvec3 right = glm::normalize(glm::cross(forward, usableUp(view_up, forward)));
-  const glm::dvec3 up = glm::cross(right, forward);
+  return {right, glm::cross(right, forward), forward};
+}
+
+glm::dmat4 Camera::viewFromWorld() const {
+  const auto [right, up, forward] = axes();
   glm::dmat4 view_from_world(1);
   for (int axis = 0; axis < 3; ++axis)
     view_from_world[axis] = glm::dvec4(right[axis], up[axis], -forward[axis], 0);

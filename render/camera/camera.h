@@ -12,6 +12,11 @@ namespace curvisplat {
 
 enum class Projection { kOrthographic, kPerspective };
 
+/// The directions of the screen, of unit length.
+struct ViewAxes {
+  glm::dvec3 right, up, forward;
+};
+
 /// A camera in world units, after --scale has been applied to the data.
 struct Camera {
   glm::dvec3 position{0, 0, 1};
@@ -35,12 +40,14 @@ struct Camera {
   /// perspective by the distance from the focal point. The position is outside the box.
   void fit(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size);
 
-  /// The up vector that viewFromWorld() uses: view_up, or its replacement.
+  /// The up vector that axes() uses: view_up, or, where it is parallel to the view, (-z, x, y) of it, as in VTK.
   glm::dvec3 usableViewUp() const;
 
+  /// Throws UsageError if position and focal point coincide.
+  ViewAxes axes() const;
+
   /// Right-handed view space: x right, y up, looking along -z; the origin is `position` for both projections.
-  /// A view_up parallel to the view is replaced as VTK does: (x, y, z) by (-z, x, y). Throws UsageError if
-  /// position and focal point coincide.
+  /// Throws as axes() does.
   glm::dmat4 viewFromWorld() const;
 };
 

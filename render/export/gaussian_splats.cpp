@@ -247,9 +247,10 @@ View viewOf(const Camera& camera, ImageSize size) {
   if (camera.projection != Projection::kOrthographic)
     throw UsageError("Gaussian splats are compared with orthographic cameras only");
   View view;
-  view.forward = glm::normalize(camera.focal_point - camera.position);
-  view.right = glm::normalize(glm::cross(view.forward, camera.usableViewUp()));
-  view.down = glm::cross(view.forward, view.right);
+  const ViewAxes axes = camera.axes();
+  view.forward = axes.forward;
+  view.right = axes.right;
+  view.down = -axes.up;
   view.position = camera.focal_point;
   view.pixels = 0.5 * size.height / camera.parallel_scale;
   return view;

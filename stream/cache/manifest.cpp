@@ -231,6 +231,10 @@ void checkVersion(uint64_t version, const std::filesystem::path& path) {
 
 }  // namespace
 
+bool Manifest::isMesh() const {
+  return blocks.size() == 1 && blocks[0].nj == 1 && blocks[0].name == (cells ? "cells" : "points");
+}
+
 bool Manifest::hasFeature(const char* feature) const {
   return std::find(requirements.begin(), requirements.end(), feature) != requirements.end();
 }

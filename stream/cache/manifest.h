@@ -135,6 +135,8 @@ struct Manifest {
   std::vector<FileInfo> files;        // all files of the cache's folder but the manifest; none of subfolders
 
   bool hasFeature(const char* feature) const;
+  /// Whether the grid is unstructured: its samples are one row, or two of cells that are two splats each (FORMAT.md).
+  bool isMesh() const;
   /// Whether the slopes in the records of bricks are those of earlier programs, which drawn ones may exceed
   /// by the factor kEarlierSlopes (border_code.h).
   bool hasEarlierSlopes() const { return hasFeature(kBorderFaces) && !hasFeature(kMergedBorders); }

@@ -45,10 +45,7 @@ ReachingSample sampleOf(const CacheReader& reader, std::span<const NodeRun> runs
       const std::array<uint64_t, 3> index{run.i + (splat - first), run.j, run.k};
       const auto [i, j, k] = manifest.cells ? manifest.refinement.cellInFiles(run.block, index)
                                             : manifest.refinement.nodeInFiles(run.block, index);
-      // A mesh, whose cells may be two splats (FORMAT.md), the second in a row of its own.
-      const BlockInfo& block = manifest.blocks[run.block];
-      const bool is_mesh = manifest.cells && block.name == "cells" && block.nj == 1;
-      return {run.block, i, j, is_mesh ? 0 : k};
+      return {run.block, i, j, manifest.isMesh() ? 0 : k};
     }
     first += run.count;
   }

@@ -285,12 +285,6 @@ std::string meantBy(const std::string& word, const Manifest& manifest, const Fac
   return didYouMean(word, names);
 }
 
-/// An unstructured grid is one block, a row of its samples, or two rows (FORMAT.md).
-bool isUnstructured(const Manifest& manifest) {
-  return manifest.blocks.size() == 1 && manifest.blocks[0].nj == 1 &&
-         (manifest.blocks[0].nk == 1 || manifest.cells);
-}
-
 size_t variableOf(const std::string& name, const CacheReader& cache) {
   try {
     return cache.variableNamed(name);
@@ -321,7 +315,7 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
                              const std::shared_ptr<const FacesReader>& faces) {
   if (text == kBlanks) return blanksOf(cache);
   const std::string path = cache.path().string();
-  if (!faces && isUnstructured(cache.manifest()))
+  if (!faces && cache.manifest().isMesh())
     throw Error(
         "{}: --surface {}: the cache is of an unstructured grid, whose faces are not kept; "
         "name an STL, PLY or OBJ file that exists",

@@ -46,17 +46,6 @@ bool drawGrip(const glm::dvec2& at, const std::string& name, ImU32 colour, const
   return ImGui::IsMouseClicked(ImGuiMouseButton_Left);
 }
 
-/// The screen's directions, in the data as it is stretched by --scale.
-struct ScreenAxes {
-  glm::dvec3 right, up, forward;
-};
-
-ScreenAxes axesOf(const Camera& camera) {
-  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
-  const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.usableViewUp()));
-  return {right, glm::cross(right, forward), forward};
-}
-
 /// The plane's point nearest to the middle of the data, its normal at unit length, and two directions in it.
 struct Frame {
   glm::dvec3 middle, normal, across, up;
@@ -108,7 +97,7 @@ glm::dvec3 turnedTo(const glm::dvec2& tip, bool is_behind, const Camera& camera)
   const double length = glm::length(tip);
   const glm::dvec2 at = length > 1 ? tip / length : tip;
   const double depth = std::sqrt(std::max(0.0, 1 - glm::dot(at, at)));
-  const ScreenAxes axes = axesOf(camera);
+  const ViewAxes axes = camera.axes();
   return glm::normalize(at.x * axes.right + at.y * axes.up + (is_behind ? depth : -depth) * axes.forward);
 }
 
@@ -158,7 +147,7 @@ bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Scene& scene) 
 bool PlaneHandles::drawTip(ClipPlane& plane, size_t number, const glm::dvec3& middle, const Scene& scene) {
   const double lever = 5 * static_cast<double>(ImGui::GetFontSize()), size = gripSize();
   const glm::dvec3 normal = glm::normalize(plane.normal / scene.scale);  // as it is seen
-  const ScreenAxes axes = axesOf(scene.camera);
+  const ViewAxes axes = scene.camera.axes();
   const glm::dvec2 tip(glm::dot(normal, axes.right), glm::dot(normal, axes.up));
   const glm::dvec2 handle = *scene.place(middle);
   glm::dvec2 along = lever * glm::dvec2(tip.x, -tip.y);

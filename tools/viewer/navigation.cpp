@@ -14,16 +14,6 @@ namespace {
 
 constexpr double kDegreesAcross = 200;  // VTK's trackball camera
 
-struct ViewAxes {
-  glm::dvec3 right, up, forward;
-};
-
-ViewAxes axesOf(const Camera& camera) {
-  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
-  const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.usableViewUp()));
-  return {right, glm::cross(right, forward), forward};
-}
-
 glm::dvec3 turned(const glm::dvec3& vector, double degrees, const glm::dvec3& axis) {
   return glm::dvec3(glm::rotate(glm::dmat4(1), glm::radians(degrees), axis) * glm::dvec4(vector, 0));
 }
@@ -46,7 +36,7 @@ double unitsPerPixel(const Camera& camera, ImageSize size) {
 }
 
 Camera rotated(const Camera& camera, const glm::dvec2& movement, ImageSize size) {
-  const ViewAxes axes = axesOf(camera);
+  const ViewAxes axes = camera.axes();
   const double about_up = -kDegreesAcross * movement.x / size.width;
   const double about_right = -kDegreesAcross * movement.y / size.height;
   const glm::dvec3 right = turned(axes.right, about_up, axes.up);
@@ -58,7 +48,7 @@ Camera rotated(const Camera& camera, const glm::dvec2& movement, ImageSize size)
 }
 
 Camera panned(const Camera& camera, const glm::dvec2& movement, ImageSize size) {
-  const ViewAxes axes = axesOf(camera);
+  const ViewAxes axes = camera.axes();
   const double unit = unitsPerPixel(camera, size);
   const glm::dvec3 shift = unit * (movement.y * axes.up - movement.x * axes.right);
   Camera result = camera;
@@ -82,7 +72,7 @@ Camera zoomedAt(const Camera& camera, double factor, const glm::dvec2& pixel, Im
 }
 
 Camera looking(const Camera& camera, const glm::dvec2& movement, ImageSize size) {
-  const ViewAxes axes = axesOf(camera);
+  const ViewAxes axes = camera.axes();
   const double degrees_per_pixel = camera.view_angle_deg / size.height;
   const double about_up = -degrees_per_pixel * movement.x, about_right = -degrees_per_pixel * movement.y;
   const glm::dvec3 right = turned(axes.right, about_up, axes.up);
@@ -94,7 +84,7 @@ Camera looking(const Camera& camera, const glm::dvec2& movement, ImageSize size)
 }
 
 Camera flown(const Camera& camera, const glm::dvec3& step) {
-  const ViewAxes axes = axesOf(camera);
+  const ViewAxes axes = camera.axes();
   const glm::dvec3 shift = step.x * axes.right + step.y * axes.up + step.z * axes.forward;
   Camera result = camera;
   result.position += shift;
@@ -106,7 +96,7 @@ Camera withOtherProjection(const Camera& camera) {
   Camera result = camera;
   const double tangent = halfAngleTangent(camera);
   if (camera.projection == Projection::kOrthographic) {
-    const glm::dvec3 towards_viewer = -axesOf(camera).forward;
+    const glm::dvec3 towards_viewer = -camera.axes().forward;
     result.projection = Projection::kPerspective;
     result.position = camera.focal_point + camera.parallel_scale / tangent * towards_viewer;
   } else {
@@ -126,7 +116,7 @@ Camera holding(const Camera& camera, ImageSize from, ImageSize to) {
 }
 
 Camera refitted(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) {
-  const ViewAxes axes = axesOf(camera);
+  const ViewAxes axes = camera.axes();
   const double radius = std::max(glm::length(upper - lower) / 2, 1e-300);
   const double narrower = std::min(1.0, static_cast<double>(size.width) / size.height);
   const double half_angle = std::atan(halfAngleTangent(camera) * narrower);
