@@ -109,7 +109,7 @@ bool SweepBuffer::isBehind(const SweptPart& part) const {
 
 bool SweepBuffer::awaitTurn(uint64_t sequence) {
   MutexLock lock(mutex_);
-  while (!closed_ && turn_ != sequence) changed_.wait(lock);
+  while (!closed_ && turn_ != sequence) turnOf(sequence).wait(lock);
   return !closed_;
 }
 
@@ -122,7 +122,8 @@ void SweepBuffer::endTurn() {
   ++turn_;
   mark_ = turn_ < parts_.size() ? std::min(std::max(begin_, swept_[parts_[turn_]].begin()), end_) : end_;
   worth_counting_ |= entered_ >= batch_splats_ / 2 || turn_ == parts_.size();
-  changed_.notify_all();
+  turnOf(turn_).notify_all();
+  if (worth_counting_) batch_.notify_all();
 }
 
 std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t brick, std::span<const DepthItem> sorted) {
@@ -167,7 +168,7 @@ bool SweepBuffer::awaitSpace(uint32_t brick, std::span<const DepthItem> sorted) 
     if (splits_.empty() && countFinals() == 0) makeSpace(brick, sorted);
   } else {
     const size_t before = free_.size();
-    while (!closed_ && free_.size() <= before && !isQuiet()) changed_.wait(lock);
+    while (!closed_ && free_.size() <= before && !isQuiet()) space_.wait(lock);
   }
   return !closed_;
 }
@@ -181,7 +182,8 @@ void SweepBuffer::fill(Run& run, std::span<const DepthItem> sorted, std::span<co
   const MutexLock lock(mutex_);
   run.filled = true;
   --filling_;
-  changed_.notify_all();
+  filled_.notify_all();
+  space_.notify_all();
 }
 
 std::optional<SweepBuffer::Batch> SweepBuffer::next() {
@@ -196,7 +198,7 @@ std::optional<SweepBuffer::Batch> SweepBuffer::awaitNext() {
     const bool all_in = turn_ == parts_.size();
     if (auto batch = cut(all_in ? 1 : batch_splats_)) return batch;
     if (all_in) break;
-    changed_.wait(lock);
+    batch_.wait(lock);
   }
   return {};
 }
@@ -268,7 +270,7 @@ std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
   batch.sequence = batches_++;
   batch.turn = split_turn_;
   ++under_way_;
-  changed_.notify_all();  // the last one may be out
+  if (!splits_.empty()) batch_.notify_one();
   return batch;
 }
 
@@ -361,7 +363,7 @@ bool SweepBuffer::awaitFilled(const Batch& batch) {
     return std::all_of(batch.pieces.begin(), batch.pieces.end(),
                        [](const Piece& piece) { return piece.run->filled; });
   };
-  while (!closed_ && !all_filled()) changed_.wait(lock);
+  while (!closed_ && !all_filled()) filled_.wait(lock);
   return !closed_;
 }
 
@@ -385,7 +387,7 @@ void SweepBuffer::giveBack(const Batch& batch) {
   const MutexLock lock(mutex_);
   for (const Piece& piece : batch.pieces) release(*piece.run, piece.from, piece.to);
   --under_way_;
-  changed_.notify_all();
+  space_.notify_all();
 }
 
 uint64_t SweepBuffer::batches() const {
@@ -406,7 +408,8 @@ size_t SweepBuffer::peakSplats() const {
 void SweepBuffer::close() {
   const MutexLock lock(mutex_);
   closed_ = true;
-  changed_.notify_all();
+  for (ConditionVariable& turn : turns_) turn.notify_all();
+  for (ConditionVariable* other : {&batch_, &filled_, &space_}) other->notify_all();
 }
 
 }  // namespace curvisplat

@@ -34,6 +34,7 @@
 // Splats are stored in pages. A page is free again when all splats in it have been read or discarded.
 #pragma once
 
+#include <array>
 #include <compare>
 #include <cstddef>
 #include <cstdint>
@@ -161,6 +162,7 @@ class SweepBuffer {
   std::optional<Batch> cut(size_t at_least) REQUIRES(mutex_);
   void splitFinals(size_t finals, bool last_may_stay) REQUIRES(mutex_);
   void endTurn() REQUIRES(mutex_);
+  ConditionVariable& turnOf(uint64_t sequence) { return turns_[sequence % turns_.size()]; }
   void makeSpace(uint32_t brick, std::span<const DepthItem> sorted) REQUIRES(mutex_);
   size_t pagesNeeded(uint32_t brick, std::span<const DepthItem> sorted) const REQUIRES(mutex_);
   SweepPosition pageStart(size_t eighths, uint32_t brick, std::span<const DepthItem> sorted) const
@@ -175,7 +177,11 @@ class SweepBuffer {
   std::unique_ptr<uint32_t[]> keys_;
 
   mutable Mutex mutex_;        // for writing keys_, too; splats are their run's until it is filled
-  ConditionVariable changed_;  // anything that someone waits for
+  // Each thread is woken by what it waits for: with one condition for all, each step would wake every worker.
+  std::array<ConditionVariable, 16> turns_;  // [turn number, modulo] that turn has come
+  ConditionVariable batch_;                  // a batch may be cut, or there will be none
+  ConditionVariable filled_;                 // a run is filled
+  ConditionVariable space_;                  // a page is free, or nobody but who waits can free one
   std::vector<uint16_t> left_ GUARDED_BY(mutex_);  // [page] splats that are still to be read
   std::vector<uint32_t> free_ GUARDED_BY(mutex_);  // pages
   std::span<const SweptPart> swept_ GUARDED_BY(mutex_);
