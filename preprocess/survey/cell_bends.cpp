@@ -87,6 +87,11 @@ class SecondDifferences {
       const size_t n = at + static_cast<size_t>(step);
       return glm::dvec3(nodes_.x[n], nodes_.y[n], nodes_.z[n]);
     };
+    for (size_t a = 0; a < 3; ++a) {
+      const size_t b = (a + 1) % 3;
+      if (counts_[a] == 2 && counts_[b] == 2 && isWedge(position, before[a] + after[a], before[b] + after[b]))
+        return;
+    }
     const auto per = [&](size_t axis) { return before[axis] != 0 && after[axis] != 0 ? 0.5 : 1.0; };
     glm::dmat3 jacobian(0.0);
     std::array<glm::dvec3, 6> second{};
@@ -115,6 +120,15 @@ class SecondDifferences {
   }
 
  private:
+  /// Whether a column of cells, from the node along two axes, has cells with three corners: where three blocks meet.
+  /// Their parts would be as pointed as they are.
+  template <class Position>
+  static bool isWedge(const Position& position, ptrdiff_t along, ptrdiff_t across) {
+    const glm::dvec3 here = position(0), next = position(along), other = position(across);
+    const glm::dvec3 opposite = position(along + across);
+    return here == next || here == other || opposite == next || opposite == other;
+  }
+
   const NodeArrays& nodes_;
   std::array<size_t, 3> strides_;
   std::array<uint64_t, 3> counts_;

@@ -57,6 +57,18 @@ TEST(CellBends, ParallelepipedsHaveNone) {
   EXPECT_EQ(noteOnCells(*grid), "");
 }
 
+TEST(CellBends, LeavesColumnsWhereThreeBlocksMeet) {
+  const auto grid = [](double length) {  // of the column's edge from (1, 1) to (0, 1)
+    return gridOf({gridBlock(2, 2, 4), gridBlock(4, 2, 2)}, [length](const glm::dvec3& n, uint32_t block) {
+      if (block == 1) return glm::dvec3(10 + n.x, n.y, n.z);
+      return glm::dvec3(n.y == 0 ? n.x : 1 - length * (1 - n.x), n.y, n.z);
+    });
+  };
+  EXPECT_EQ(measureBends(*grid(0), kAll).at(0).deviation(), 0);
+  EXPECT_FALSE(refinementByNeed(*grid(0)).cutsCells());
+  EXPECT_GT(measureBends(*grid(0.1), kAll).at(0).deviation(), 1);
+}
+
 /// The deviation of cells that are cut, over that of whole ones.
 double rest(const Place& place, const CellCuts& cuts) {
   const BlockBends bends = measureBends(*gridOf({gridBlock(6, 6, 6)}, place), kAll).at(0);
