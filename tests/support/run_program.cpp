@@ -101,7 +101,16 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments, const 
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, out.write_end, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, err.write_end, STDERR_FILENO);
-  const int failed = posix_spawn(&child_, program.c_str(), &actions, nullptr, argv.data(), environ);
+  // A shell's background jobs ignore SIGINT, and what they start would, too.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t answered;
+  sigemptyset(&answered);
+  sigaddset(&answered, SIGINT);
+  posix_spawnattr_setsigdefault(&attributes, &answered);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+  const int failed = posix_spawn(&child_, program.c_str(), &actions, &attributes, argv.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   require(failed == 0, failed, program.c_str());
   Pipe::closeEnd(out.write_end);
