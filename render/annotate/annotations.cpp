@@ -333,6 +333,10 @@ std::array<glm::dvec2, 3> axisNames(const AnnotatedScene& scene) {
   return {arrowOf(scene, 0).name, arrowOf(scene, 1).name, arrowOf(scene, 2).name};
 }
 
+bool hasAnnotations() {
+  return true;
+}
+
 ImageSize dataSize(const Annotations& annotations, ImageSize picture,
                    std::span<const ShownFunction> functions) {
   if (!annotations.scalar_bar) return picture;

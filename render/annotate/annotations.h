@@ -19,6 +19,9 @@
 
 namespace curvisplat {
 
+/// Whether this program was built with them.
+bool hasAnnotations();
+
 /// The annotations that are drawn over a picture.
 struct Annotations {
   bool scalar_bar = false;

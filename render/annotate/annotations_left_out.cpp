@@ -14,6 +14,10 @@ void refuse(const Annotations& annotations) {
 
 }  // namespace
 
+bool hasAnnotations() {
+  return false;
+}
+
 ImageSize dataSize(const Annotations& annotations, ImageSize picture,
                    std::span<const ShownFunction> /*functions*/) {
   refuse(annotations);

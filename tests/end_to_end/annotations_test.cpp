@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,26 @@ TEST_F(Annotations, EachIsDrawnInItsPlace) {
   EXPECT_EQ(changed(plain, axes, 0, 80, 0, 80), 0);
   const Image outline = render({"--outline"});
   EXPECT_GT(changed(plain, outline, 0, 200, 0, 160), 300);
+}
+
+/// A picture whose colours nobody has chosen says what they mean; options that draw it again say so, too.
+TEST_F(Annotations, ScalarBarsComeWithColoursThatAreChosen) {
+  std::string out;
+  const auto picture = [&](const Words& options, const std::string& size = "400x300") {
+    out = run(Words{"render", file("a.splats"), "-o", file("bar.png"), "--size", size} + options).out;
+    return readImage(file("bar.png")).rgba;
+  };
+  const auto plain = picture({"--no-scalar-bar"}), with_bar = picture({});
+  EXPECT_NE(with_bar, plain);
+  const std::string chosen = "chosen from the data: ";
+  std::istringstream words(out.substr(out.find(chosen) + chosen.size()));
+  Words again;
+  for (std::string word; words >> word;) again.push_back(word);
+  ASSERT_EQ(again.back(), "--scalar-bar") << out;
+  EXPECT_EQ(picture(again), with_bar) << out;
+  EXPECT_EQ(picture({"--scalar-bar"}), with_bar);
+  EXPECT_EQ(picture({}, "399x299"), picture({"--no-scalar-bar"}, "399x299"));
+  EXPECT_EQ(picture({"--tf", "viridis"}), picture({"--tf", "viridis", "--no-scalar-bar"}));
 }
 
 /// A filled box shows nine edges in parallel projection; each direction has four of one length.

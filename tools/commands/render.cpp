@@ -53,6 +53,14 @@ ChosenFor drawnSteps(const RenderArguments& arguments) {
   return steps.severalSteps() || may_follow_path ? ChosenFor::kSeries : ChosenFor::kStep;
 }
 
+/// Whether a picture has scalar bars without being asked: they say what the colours mean that nobody has chosen.
+bool hasBarsByDefault(const RenderArguments& arguments, ImageSize picture) {
+  constexpr int kMinSide = 300;  // pixels; below, bars would leave too little to the data
+  return hasAnnotations() && givenFunctionOptions(arguments.scalar).empty() && arguments.surfaces.volume == "on" &&
+         arguments.camera.path.empty() && std::min(picture.width, picture.height) >= kMinSide &&
+         (isMovieName(arguments.output) || isPageName(arguments.output) || arguments.output.extension() == ".png");
+}
+
 /// Memory, in bytes, that annotating and writing a picture take. `data`: the part beside the scalar bars.
 uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture, ImageSize data) {
   uint64_t bytes = 0;
@@ -140,9 +148,11 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
 
 void render(const RenderArguments& given) {
   RenderArguments arguments = given;
-  arguments.annotations.showTitles();
   Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
+  const bool bars_by_default = !arguments.annotations.bars && hasBarsByDefault(arguments, options.size);
+  arguments.annotations.shown.scalar_bar = bars_by_default;
+  arguments.annotations.showTitles();
   arguments.surfaces.film_has_slices =
       !arguments.camera.path.empty();  // unless it turns out that it has none
   checkRenderArguments(arguments, options.size);
@@ -273,7 +283,7 @@ void render(const RenderArguments& given) {
   writeReport();
   printResult(report);
   if (const std::string chosen = choice.chosenOptions(); !chosen.empty())
-    printLine("chosen from the data: {}", chosen);
+    printLine("chosen from the data: {}{}", chosen, bars_by_default ? " --scalar-bar" : "");
 }
 
 }  // namespace

@@ -320,8 +320,9 @@ std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const
 
 void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group) {
   command
-      .add_flag("--scalar-bar", arguments.shown.scalar_bar,
-                "Draw scalar bars beside the data, one for each function that is shown")
+      .add_flag("--scalar-bar,!--no-scalar-bar", arguments.bars,
+                "Draw scalar bars beside the data, one for each function that is shown (default: in a .png, "
+                "movie or page of 300x300 or more whose function is chosen from the data)")
       ->group(group);
   command
       .add_option("--scalar-bar-title", arguments.bar_titles,
@@ -367,7 +368,7 @@ void checkAnnotationArguments(const AnnotationArguments& arguments) {
 
 void AnnotationArguments::showTitles() {
   constexpr double kMin = 4, kMax = 1000;
-  shown.scalar_bar |= !bar_titles.empty();
+  shown.scalar_bar = bars.value_or(shown.scalar_bar) || !bar_titles.empty();
   shown.axes_grid |= axis_titles.has_value();
   shown.texts = title || label;
   if (!text_size) return;
