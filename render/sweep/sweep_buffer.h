@@ -176,12 +176,12 @@ class SweepBuffer {
   std::unique_ptr<ScreenSplat[]> splats_;
   std::unique_ptr<uint32_t[]> keys_;
 
-  mutable Mutex mutex_;        // for writing keys_, too; splats are their run's until it is filled
+  mutable Mutex mutex_;  // for writing keys_, too; splats are their run's until it is filled
   // Each thread is woken by what it waits for: with one condition for all, each step would wake every worker.
-  std::array<ConditionVariable, 16> turns_;  // [turn number, modulo] that turn has come
-  ConditionVariable batch_;                  // a batch may be cut, or there will be none
-  ConditionVariable filled_;                 // a run is filled
-  ConditionVariable space_;                  // a page is free, or nobody but who waits can free one
+  std::array<ConditionVariable, 16> turns_;        // [turn number, modulo] that turn has come
+  ConditionVariable batch_;                        // a batch may be cut, or there will be none
+  ConditionVariable filled_;                       // a run is filled
+  ConditionVariable space_;                        // a page is free, or nobody but who waits can free one
   std::vector<uint16_t> left_ GUARDED_BY(mutex_);  // [page] splats that are still to be read
   std::vector<uint32_t> free_ GUARDED_BY(mutex_);  // pages
   std::span<const SweptPart> swept_ GUARDED_BY(mutex_);

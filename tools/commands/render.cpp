@@ -56,9 +56,11 @@ ChosenFor drawnSteps(const RenderArguments& arguments) {
 /// Whether a picture has scalar bars without being asked: they say what the colours mean that nobody has chosen.
 bool hasBarsByDefault(const RenderArguments& arguments, ImageSize picture) {
   constexpr int kMinSide = 300;  // pixels; below, bars would leave too little to the data
-  return hasAnnotations() && givenFunctionOptions(arguments.scalar).empty() && arguments.surfaces.volume == "on" &&
+  return hasAnnotations() && !arguments.annotations.no_bars &&
+         givenFunctionOptions(arguments.scalar).empty() && arguments.surfaces.volume == "on" &&
          arguments.camera.path.empty() && std::min(picture.width, picture.height) >= kMinSide &&
-         (isMovieName(arguments.output) || isPageName(arguments.output) || arguments.output.extension() == ".png");
+         (isMovieName(arguments.output) || isPageName(arguments.output) ||
+          arguments.output.extension() == ".png");
 }
 
 /// Memory, in bytes, that annotating and writing a picture take. `data`: the part beside the scalar bars.
@@ -150,9 +152,10 @@ void render(const RenderArguments& given) {
   RenderArguments arguments = given;
   Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
-  const bool bars_by_default = !arguments.annotations.bars && hasBarsByDefault(arguments, options.size);
-  arguments.annotations.shown.scalar_bar = bars_by_default;
   arguments.annotations.showTitles();
+  bool& has_bars = arguments.annotations.shown.scalar_bar;
+  const bool bars_by_default = !has_bars && hasBarsByDefault(arguments, options.size);
+  has_bars |= bars_by_default;
   arguments.surfaces.film_has_slices =
       !arguments.camera.path.empty();  // unless it turns out that it has none
   checkRenderArguments(arguments, options.size);

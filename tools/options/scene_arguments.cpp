@@ -319,11 +319,16 @@ std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const
 }
 
 void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group) {
-  command
-      .add_flag("--scalar-bar,!--no-scalar-bar", arguments.bars,
-                "Draw scalar bars beside the data, one for each function that is shown (default: in a .png, "
-                "movie or page of 300x300 or more whose function is chosen from the data)")
-      ->group(group);
+  CLI::Option* const bar =
+      command
+          .add_flag(
+              "--scalar-bar", arguments.shown.scalar_bar,
+              "Draw scalar bars beside the data, one for each function that is shown (default: in a .png, "
+              "movie or page of 300x300 or more whose function is chosen from the data)")
+          ->group(group);
+  command.add_flag("--no-scalar-bar", arguments.no_bars, "Draw no scalar bars where nothing asks for them")
+      ->group(group)
+      ->excludes(bar);
   command
       .add_option("--scalar-bar-title", arguments.bar_titles,
                   "Title of the scalar bar (default: name and unit of the scalar); repeatable, for the bars "
@@ -368,7 +373,7 @@ void checkAnnotationArguments(const AnnotationArguments& arguments) {
 
 void AnnotationArguments::showTitles() {
   constexpr double kMin = 4, kMax = 1000;
-  shown.scalar_bar = bars.value_or(shown.scalar_bar) || !bar_titles.empty();
+  shown.scalar_bar |= !bar_titles.empty();
   shown.axes_grid |= axis_titles.has_value();
   shown.texts = title || label;
   if (!text_size) return;

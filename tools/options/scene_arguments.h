@@ -93,7 +93,7 @@ std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const
 /// Options of what is drawn over a picture, as given; checked and parsed later.
 struct AnnotationArguments {
   Annotations shown;
-  std::optional<bool> bars;  // --scalar-bar, or --no-scalar-bar
+  bool no_bars = false;  // none by default
   std::vector<std::string> bar_titles;
   std::optional<std::string> axis_titles, title, label, text_size;
 
