@@ -110,9 +110,9 @@ class Pictures(PythonTest):
     def test_have_every_option_of_the_command(self):
         own_names = {"-o": "", "tf": "colours", "clip-plane": "clip_planes", "surface": "surfaces", "surface-colour": "surface_colours",
                      "slice": "slices", "iso": "isovalues", "scalar-bar-title": "scalar_bar_titles"}
-        # Of grids, of several frames (orbit() has their cameras), of files.
+        # Of grids, of several frames (orbit() has their cameras), of files; and what is not drawn unless it is asked for.
         others = {"help", "help-all", "value-precision", "output", "steps", "orbit", "path", "frames", "frame-rate", "part", "first-image",
-                  "stats", "trace"}
+                  "stats", "trace", "no-scalar-bar"}
         told = command("render", "--help").stdout
         options = set(re.findall(r"--([a-z-]+)", told.split("\n", 1)[1]))
         listed = {name for name in options - others if f"  --{name} " in told}
