@@ -163,7 +163,6 @@ void FramePipeline::release() {
 }
 
 void FramePipeline::stepChanged() {
-  content_ = nextContent();
   layers_.stepChanged();
   if (pools_) pools_->source.stepChanged();
 }

@@ -179,7 +179,7 @@ class FramePipeline {
   size_t aside_waiting_splats_ = 0;
   HiddenBricks hidden_;
   LayerDrawer layers_;
-  uint64_t content_;                         // BrickStore::open()
+  const uint64_t content_;                   // BrickStore::open()
   std::vector<StoredPart> stored_;           // the parts of the plan that are drawn from the store
   std::vector<uint8_t> is_stored_;           // [part of the plan]; empty: none is
   std::vector<uint32_t> unread_;             // stored bricks, sorted

@@ -44,9 +44,10 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
     const glm::dvec3 cell_min = cache_.manifest().root.cellMin(brick.cell);
     if (!BrickStore::canDraw(brick, cell_min, plan.settings.view)) continue;
     numbers.push_back(number);
-    stored_.push_back({part.part.brick, brick.splats, SplatRanges(brick, part.part.octants), cell_min,
-                       part.keys, BrickStore::clipsOf(brick, plan.settings),
-                       meetsLayers(brick, plan.settings), coloured_by_.has_value()});
+    stored_.push_back({part.part.brick, brick.splats, brick.octant_splats,
+                       SplatRanges(brick, part.part.octants), cell_min, part.keys,
+                       BrickStore::clipsOf(brick, plan.settings), meetsLayers(brick, plan.settings),
+                       coloured_by_.has_value()});
   }
   // Bricks that are put tell how much room they need, so that fewer of the parts may fit than it seemed.
   for (;;) {
@@ -55,7 +56,7 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
       BrickStore* const store = painter.store();
       const uint64_t bytes = store ? options.card_memory_bytes.value_or(store->defaultBytes()) : 0;
       is_storing_ = bytes > 0;
-      if (store) store->open(content_);
+      if (store) store->open(content_, cache_.position());
       const size_t fitting = store ? store->makeRoom(stored_, bytes) : 0;
       stored_.erase(stored_.begin() + static_cast<std::ptrdiff_t>(fitting), stored_.end());
       for (const StoredPart& part : stored_)
@@ -82,7 +83,7 @@ void FramePipeline::putIntoStore(std::span<const StoredPart> parts, const Border
   const auto put = [&](size_t part, const glm::dvec3&, const BrickSource::Splats& splats) {
     const auto send = [&](const BrickPieces& pieces) {
       painting_->run([&](Painter& painter) {
-        painter.store()->put(parts[part].brick, splats.geometry, {splats.values, splats.second}, pieces);
+        painter.store()->put(parts[part], splats.geometry, {splats.values, splats.second}, pieces);
       });
     };
     const uint32_t* const codes = splats.geometry.border_code;

@@ -34,6 +34,13 @@ void CardBuffer::clear() const {
   gl_.ClearBufferData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
 }
 
+void CardBuffer::fill(uint64_t bytes, float value) const {
+  bind();
+  gl_.ClearBufferSubData(GL_SHADER_STORAGE_BUFFER, GL_R32F, 0, static_cast<GLsizeiptr>(bytes), GL_RED,
+                         GL_FLOAT, &value);
+  gl_.check("emptying a buffer of the card");
+}
+
 void CardBuffer::writeBytes(uint64_t offset, const void* bytes, uint64_t count) const {
   if (count == 0) return;
   bind();

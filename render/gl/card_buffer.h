@@ -26,6 +26,8 @@ class CardBuffer {
   void bind() const { gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, object_.name()); }
   /// Fills the buffer with zeros.
   void clear() const;
+  /// Fills the first bytes with this number.
+  void fill(uint64_t bytes, float value) const;
   /// Writes the values from the offset in bytes on; they must fit into the buffer.
   template <typename T>
   void write(uint64_t offset, std::span<const T> values) const {

@@ -88,21 +88,22 @@ namespace curvisplat {
   X(Viewport, PFNGLVIEWPORTPROC)
 
 // These are null, or fail, if the context is older than 4.3: see whyNoCompute().
-#define CURVISPLAT_GL_4_3_FUNCTIONS(X)           \
-  X(BindBufferBase, PFNGLBINDBUFFERBASEPROC)     \
-  X(BindImageTexture, PFNGLBINDIMAGETEXTUREPROC) \
-  X(ClearBufferData, PFNGLCLEARBUFFERDATAPROC)   \
-  X(DispatchCompute, PFNGLDISPATCHCOMPUTEPROC)   \
-  X(GetBufferSubData, PFNGLGETBUFFERSUBDATAPROC) \
-  X(GetInteger64v, PFNGLGETINTEGER64VPROC)       \
-  X(GetTexImage, PFNGLGETTEXIMAGEPROC)           \
-  X(MapBufferRange, PFNGLMAPBUFFERRANGEPROC)     \
-  X(MemoryBarrier, PFNGLMEMORYBARRIERPROC)       \
-  X(TexStorage3D, PFNGLTEXSTORAGE3DPROC)         \
-  X(Uniform1ui, PFNGLUNIFORM1UIPROC)             \
-  X(Uniform2i, PFNGLUNIFORM2IPROC)               \
-  X(Uniform3i, PFNGLUNIFORM3IPROC)               \
-  X(Uniform4i, PFNGLUNIFORM4IPROC)               \
+#define CURVISPLAT_GL_4_3_FUNCTIONS(X)               \
+  X(BindBufferBase, PFNGLBINDBUFFERBASEPROC)         \
+  X(BindImageTexture, PFNGLBINDIMAGETEXTUREPROC)     \
+  X(ClearBufferData, PFNGLCLEARBUFFERDATAPROC)       \
+  X(ClearBufferSubData, PFNGLCLEARBUFFERSUBDATAPROC) \
+  X(DispatchCompute, PFNGLDISPATCHCOMPUTEPROC)       \
+  X(GetBufferSubData, PFNGLGETBUFFERSUBDATAPROC)     \
+  X(GetInteger64v, PFNGLGETINTEGER64VPROC)           \
+  X(GetTexImage, PFNGLGETTEXIMAGEPROC)               \
+  X(MapBufferRange, PFNGLMAPBUFFERRANGEPROC)         \
+  X(MemoryBarrier, PFNGLMEMORYBARRIERPROC)           \
+  X(TexStorage3D, PFNGLTEXSTORAGE3DPROC)             \
+  X(Uniform1ui, PFNGLUNIFORM1UIPROC)                 \
+  X(Uniform2i, PFNGLUNIFORM2IPROC)                   \
+  X(Uniform3i, PFNGLUNIFORM3IPROC)                   \
+  X(Uniform4i, PFNGLUNIFORM4IPROC)                   \
   X(UnmapBuffer, PFNGLUNMAPBUFFERPROC)
 
 struct GlFunctions {

@@ -20,7 +20,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint32_t kLastKey = INT32_MAX;
 // Records before a batch's first element, since records of a splat are looked for before it.
 constexpr size_t kMaxRecords = 3;
 enum : size_t { kPaint = GlTileLists::kOtherStages, kProject, kStages };
@@ -46,7 +45,8 @@ uint64_t defaultBytesOf(const GlFunctions& gl) {
 GlTilePainter::Capacity within(const GlFunctions& gl, uint64_t default_bytes,
                                const GlTilePainter::Capacity& most) {
   const uint64_t bytes = std::min(default_bytes / 6, CardBuffer::largest(gl));
-  return {most.splats, std::clamp<size_t>(bytes / GlTileLists::kEntryBytes, 1, most.entries)};
+  return {most.splats, std::clamp<size_t>(bytes / GlTileLists::kEntryBytes, 1, most.entries),
+          most.buffer_bytes};
 }
 
 /// An element that fills the gap before a batch's first: it is no splat, and no shader draws it.
@@ -78,7 +78,7 @@ struct GlTilePainter::State final : BrickStore {
         lists(gl, timers),
         splats(gl),
         closed(gl),
-        bricks(gl),
+        bricks(gl, capacity_.buffer_bytes),
         windows(makeTexture(gl)),
         framebuffer(makeFramebuffer(gl)),
         drawn(makeBuffer(gl)) {}
@@ -92,8 +92,10 @@ struct GlTilePainter::State final : BrickStore {
   GlTileLists lists;
   CardBuffer splats, closed;  // closed: pixels of each small tile, then of each large one, that take no more
   CardBricks bricks;
-  size_t stored = 0;  // elements that were projected from bricks, in `splats`; the batch follows
-  std::function<void()> project_stored;
+  size_t stored = 0;  // elements of `splats` for those projected from bricks; the batch follows
+  std::vector<CardSlab> slabs;
+  size_t slab = 0;  // the one that is projected there
+  std::function<void()> project_slab;
   GlObject windows, framebuffer, drawn;  // drawn: the windows, where the processor can read them
   ImageSize size{0, 0};
   int window_count = 0;
@@ -113,15 +115,15 @@ struct GlTilePainter::State final : BrickStore {
   double upload_s = 0, draw_s = 0;
   uint64_t window_bytes = 0, most_bytes = 0;  // on the card
 
-  void open(uint64_t content) override { bricks.open(content); }
+  void open(uint64_t content, const StepPosition& step) override { bricks.open(content, step); }
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) override {
     return bricks.makeRoom(parts, bytes);
   }
   uint64_t defaultBytes() const override { return default_bytes; }
   bool has(uint32_t brick) const override { return bricks.has(brick); }
-  void put(uint32_t brick, const GeometryArrays<const float>& geometry, const BrickValues& values,
+  void put(const StoredPart& part, const GeometryArrays<const float>& geometry, const BrickValues& values,
            const BrickPieces& pieces) override {
-    bricks.put(brick, geometry, values, pieces);
+    bricks.put(part, geometry, values, pieces);
   }
   void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
                   std::span<const StoredPart> parts) override;
@@ -133,7 +135,8 @@ struct GlTilePainter::State final : BrickStore {
   CardTiles tilesOf(bool small) const;
   size_t largeTiles() const { return TileSet::tilesOf(size, kLargeTile); }
   void paintBatch(bool last);
-  ListedSplats listedSplats(bool last) const;
+  void paintSlabs(bool last);
+  void goToSlab(size_t wanted);
   void upload();
   void paintBox(const ListedSplats& listed, const CardTiles& tiles, const TileBox& box);
   void paintLists(const CardTiles& tiles, const TileBox& box);
@@ -217,6 +220,7 @@ void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const Cla
   state.clip = {0, 0, size.width, size.height};
   state.batch.assign(kMaxRecords, kNoSplat);
   state.stored = 0;
+  state.slabs.clear();
   state.table = &table;
   state.painted = false;
   state.waiting = 0;
@@ -234,6 +238,7 @@ void GlTilePainter::drawOnly(const TileSet& tiles) {
                               {0, 0, state.size.width, state.size.height});
   state.painted = false;
   state.before = 0;
+  state.goToSlab(0);
 }
 
 BrickStore* GlTilePainter::store() {
@@ -243,10 +248,12 @@ BrickStore* GlTilePainter::store() {
 void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
                                       std::span<const StoredPart> parts) {
   const StageTimer timer(upload_s, "project bricks");
-  for (const StoredPart& part : parts) stored += bricks.elementsOf(part);
-  project_stored = [this, &settings, &keys, parts] {
+  slabs = bricks.beginFrame(parts);
+  for (const CardSlab& each : slabs) stored = std::max(stored, each.elements);
+  project_slab = [this, &settings, &keys] {
     timers.measure(kProject, [&] {
-      bricks.project(settings, keys, parts, tables, SplatChooser::largestScalar(*table), splats);
+      if (slabs[slab].elements < stored) splats.fill(stored * sizeof(ScreenSplat), kNoSplat.l11);
+      bricks.project(settings, keys, slabs[slab], tables, SplatChooser::largestScalar(*table), splats);
     });
   };
   try {
@@ -254,7 +261,14 @@ void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const 
   } catch (const Error& error) {
     throw Error("{}; give less --card-memory, or 0", error.what());
   }
-  project_stored();
+  slab = 0;
+  project_slab();
+}
+
+void GlTilePainter::State::goToSlab(size_t wanted) {
+  if (stored == 0 || slab == wanted) return;
+  slab = wanted;
+  project_slab();
 }
 
 void GlTilePainter::draw(std::span<const ScreenSplat> splats) {
@@ -291,15 +305,11 @@ void GlTilePainter::State::paintBatch(bool last) {
       waiting = 0;
       return;
     }
-    const ListedSplats listed = listedSplats(last);
-    const CardTiles tiles = tilesOf(listed.ordered);
-    if (clip.x0 < clip.x1 && clip.y0 < clip.y1) paintBox(listed, tiles, tilesOver(clip, tiles.side));
+    paintSlabs(last);
     if (last)
       batch.resize(kMaxRecords);
     else
-      keepWaiting(listed.front);
-    before = listed.front;
-    painted = true;
+      keepWaiting(before);
   } else {
     batch.resize(kMaxRecords);
   }
@@ -307,16 +317,27 @@ void GlTilePainter::State::paintBatch(bool last) {
   batch.insert(batch.end(), records.begin(), records.end());
 }
 
-/// The batch, which ends with a splat.
-ListedSplats GlTilePainter::State::listedSplats(bool last) const {
+/// Paints the batch, which ends with a splat, and what stored bricks have up to its front: slab after slab, with what the
+/// batch has there.
+void GlTilePainter::State::paintSlabs(bool last) {
   const std::span<const ScreenSplat> all = std::span(batch).subspan(kMaxRecords);
-  const size_t earlier = painted ? stored + kMaxRecords + waiting : 0;
-  return {&splats,
-          static_cast<uint32_t>(stored + batch.size()),
-          static_cast<uint32_t>(earlier),
-          before,
-          last ? kLastKey : all.back().first,
-          stored > 0 || waiting > 0 || std::any_of(all.begin(), all.end(), leans)};
+  const uint32_t front = last ? CardBricks::kLastKey : all.back().first;
+  const bool ordered = stored > 0 || waiting > 0 || std::any_of(all.begin(), all.end(), leans);
+  const CardTiles tiles = tilesOf(ordered);
+  const TileBox box = tilesOver(clip, tiles.side);
+  size_t earlier = painted ? stored + kMaxRecords + waiting : 0;
+  for (;;) {
+    const uint32_t until = stored > 0 ? std::min(front, slabs[slab].front) : front;
+    const ListedSplats listed{
+        &splats, static_cast<uint32_t>(stored + batch.size()), static_cast<uint32_t>(earlier), before, until,
+        ordered};
+    if (clip.x0 < clip.x1 && clip.y0 < clip.y1) paintBox(listed, tiles, box);
+    before = until;
+    painted = true;
+    if (until == front) return;
+    goToSlab(slab + 1);
+    earlier = stored + batch.size();
+  }
 }
 
 CardTiles GlTilePainter::State::tilesOf(bool small) const {
@@ -334,7 +355,7 @@ void GlTilePainter::State::upload() {
   }
   if (bytes > splats.bytes()) {  // more wait than there was space for
     splats.reserve(bytes);
-    if (stored > 0) project_stored();
+    if (stored > 0) project_slab();
   }
   splats.write(stored * sizeof(ScreenSplat), all);
 }

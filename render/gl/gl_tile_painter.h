@@ -26,6 +26,7 @@ class GlTilePainter final : public Painter {
   /// the other, and a box that leaves most of a card idle takes as long as the whole picture would.
   struct Capacity {
     size_t splats, entries;
+    uint64_t buffer_bytes = UINT64_MAX;  // the most of a buffer of bricks, if OpenGL allows as many
     /// The capacity for a card, or for OpenGL in software, which the processor's memory holds.
     static Capacity of(bool software) {
       return software ? Capacity{65536, 1 << 19} : Capacity{1 << 18, 1 << 27};

@@ -13,7 +13,6 @@ namespace curvisplat {
 namespace {
 
 constexpr const char* kInputs = R"(
-layout(std430, binding = 6) readonly buffer Planes { vec4 planes[]; };  // those that may cut a part's splats: normal, offset
 uniform samplerBuffer layer_bounds;  // PixelLayers::allBounds()
 uniform uint colour_records;  // 1 in pictures of two scalars, else 0
 )";
@@ -23,15 +22,22 @@ constexpr const char* kFunctions = R"(
 uint planesOf(uint p) {
   return parts[p + 4u].z & 255u;
 }
+uint layeredOf(uint p) {
+  return parts[p + 4u].z >> 8 & 1u;
+}
 bool isLayered(uint p) {
-  return (parts[p + 4u].z >> 8) != 0u;
+  return layeredOf(p) != 0u;
+}
+// A plane that may cut a part's splats: normal, offset.
+vec4 planeAt(uint n) {
+  return uintBitsToFloat(parts[n]);
 }
 // StoredPart::elementsASplat(), elementsAPiece().
 uint elementsASplat(uint p) {
-  return 1u + min(planesOf(p), 1u) + (parts[p + 4u].z >> 8) + colour_records;
+  return 1u + min(planesOf(p), 1u) + layeredOf(p) + colour_records;
 }
 uint elementsAPiece(uint p) {
-  return 2u + (parts[p + 4u].z >> 8) + colour_records;
+  return 2u + layeredOf(p) + colour_records;
 }
 
 const uint kInside = 0u, kAcross = 1u, kOutside = 2u;
@@ -40,7 +46,8 @@ const uint kInside = 0u, kAcross = 1u, kOutside = 2u;
 uint sideOfPlanes(uint p, vec3 position, mat3 a, float support) {
   uint side = kInside, first = parts[p + 4u].y;
   for (uint n = first; n < first + planesOf(p); ++n) {
-    float distance = dot(planes[n].xyz, position) + planes[n].w, reach = support * length(rowOf(planes[n].xyz, a));
+    vec4 plane = planeAt(n);
+    float distance = dot(plane.xyz, position) + plane.w, reach = support * length(rowOf(plane.xyz, a));
     side = max(side, distance >= reach ? kInside : distance > -reach ? kAcross : kOutside);
   }
   return side;
@@ -106,6 +113,9 @@ float correlationOf(Ray ray, vec3 w, float half_width, float steepness) {
 vec4 fourAt(uint word) {
   return uintBitsToFloat(uvec4(words[word], words[word + 1u], words[word + 2u], words[word + 3u]));
 }
+vec4 valuesAt(uint word) {
+  return uintBitsToFloat(uvec4(values[word], values[word + 1u], values[word + 2u], values[word + 3u]));
+}
 
 // A piece of a splat, or all of it.
 struct Piece {
@@ -153,10 +163,11 @@ Cut cutOf(uint p, Ray ray, Ellipse e, mat3 a, Piece piece, bool clipped) {
   if (!clipped) return cut;
   uint first = parts[p + 4u].y;
   for (uint n = first; n < first + planesOf(p); ++n) {  // LocalClipPlanes::addFaces()
-    vec3 q = rowOf(planes[n].xyz, a);
+    vec4 plane = planeAt(n);
+    vec3 q = rowOf(plane.xyz, a);
     float reach = length(q);
     if (!(reach > 0.0)) continue;
-    float distance = (dot(planes[n].xyz, piece.position) + planes[n].w) / reach;
+    float distance = (dot(plane.xyz, piece.position) + plane.w) / reach;
     if (!(distance < SUPPORT)) continue;
     cut.clipped = true;
     addFace(cut, ray, e, vec4(q / reach, distance), false);
@@ -232,21 +243,23 @@ struct Splat {
   vec3 colour_w;          // slope
 };
 
-Splat splatAt(uint n, uint at) {
+// Splat `own` of the part.
+Splat splatAt(uint p, uint own) {
+  uint n = parts[p].y, at = parts[p].x + own, of = parts[p + 5u].w + own;
   Splat s;
-  s.piece = Piece(vec3(OF(0), OF(1), OF(2)), vec3(OF(3), OF(4), OF(5)), vec3(OF(6), OF(7), OF(8)), vec3(OF(13), OF(14), OF(15)),
-                  OF(12), OF(9), 0u, 0u);
+  s.piece = Piece(vec3(OF(0), OF(1), OF(2)), vec3(OF(3), OF(4), OF(5)), vec3(OF(6), OF(7), OF(8)), vec3(VALUE_OF(1), VALUE_OF(2), VALUE_OF(3)),
+                  VALUE_OF(0), OF(9), 0u, 0u);
   s.a = factorOf(s.piece.axis, s.piece.shear);
-  s.variance = OF(16);
+  s.variance = VALUE_OF(4);
   s.opacity = 1.0;
   s.slope = s.lit_by = vec2(0.0);
   s.clipped = false;
   s.colour = s.colour_variance = 0.0;
   s.colour_w = vec3(0.0);
   if (colour_records != 0u) {
-    s.colour = OF(17);
-    s.colour_w = vec3(OF(18), OF(19), OF(20));
-    s.colour_variance = OF(21);
+    s.colour = VALUE_OF(5);
+    s.colour_w = vec3(VALUE_OF(6), VALUE_OF(7), VALUE_OF(8));
+    s.colour_variance = VALUE_OF(9);
   }
   return s;
 }
@@ -323,7 +336,7 @@ uint project(uvec4 group, uint thread) {
   uint n = parts[p].y, at = parts[p].x + group.y + thread;
   for (uint k = 0u; k < room; ++k) writeNothing(slot + 4u * k);
   if (words[at + 10u * n] != NO_BORDER) return 3u;  // it is drawn in pieces
-  Splat s = splatAt(n, at);
+  Splat s = splatAt(p, group.y + thread);
   uint planes_side = sideOfPlanes(p, s.piece.position, s.a, SUPPORT);
   if (planes_side == kOutside) return 4u;
   s.clipped = planes_side == kAcross;
@@ -345,30 +358,31 @@ uint project(uvec4 group, uint thread) {
 // This draws a splat in pieces. Returns which of `fates` counts it.
 uint projectPieces(uvec4 group, uint thread) {
   uint p = PART_VECTORS * group.x, n = parts[p].y, room = elementsAPiece(p);
-  uint table = parts[p].x + stored_arrays * n, own = table + 4u * (group.y + thread);
+  uint table = parts[p].x + GEOMETRY_ARRAYS * n, own = table + 3u * (group.y + thread);
+  uint slopes = parts[p + 5u].w + VALUE_ARRAYS * (1u + colour_records) * n;
   uint first = words[own + 1u], count = words[own + 2u];
-  uint slot = 4u * (group.w + room * (first - words[table + 4u * group.y + 1u]));
+  uint slot = 4u * (group.w + room * first);
   for (uint k = 0u; k < room * count; ++k) writeNothing(slot + 4u * k);
-  Splat s = splatAt(n, parts[p].x + words[own]);
+  Splat s = splatAt(p, words[own]);
   uint planes_side = sideOfPlanes(p, s.piece.position, s.a, SUPPORT_AT_BORDER);
   if (planes_side == kOutside) return 4u;
   s.clipped = planes_side == kAcross;
   vec3 gradient = gradientOf(s.piece.w, s.piece.axis, s.piece.shear);
   s.opacity = opacityOf(gradient);
-  if (!(s.opacity > 0.0) || isTransparentThroughout(s, uintBitsToFloat(words[own + 3u]))) return 1u;
+  if (!(s.opacity > 0.0) || isTransparentThroughout(s, uintBitsToFloat(values[slopes + group.y + thread]))) return 1u;
   Place whole = placeOf(p, s.piece.position);
   s.slope = planeOf(rowOf(whole.row0, s.a), rowOf(whole.row1, s.a), rowOf(whole.to_depth, s.a));
   s.lit_by = litAt(p, s.piece.position, gradient);
-  uint best = 0u, at = table + 4u * parts[p + 4u].x + 40u * first;
-  for (uint k = 0u; k < count; ++k, at += 40u, slot += 4u * room) {
-    vec4 q0 = fourAt(at), q1 = fourAt(at + 4u), q2 = fourAt(at + 8u), q3 = fourAt(at + 12u);
-    Piece piece = Piece(q0.xyz, q1.xyz, q2.xyz, q3.xyz, q0.w, q1.w, at + 16u, words[at + 11u]);
+  uint best = 0u, at = table + 3u * parts[p + 4u].x + 36u * first, scalar_at = slopes + parts[p + 4u].x + 4u * first;
+  for (uint k = 0u; k < count; ++k, at += 36u, scalar_at += 4u, slot += 4u * room) {
+    vec4 q0 = fourAt(at), q1 = fourAt(at + 4u), q2 = fourAt(at + 8u), of = valuesAt(scalar_at);
+    Piece piece = Piece(q0.xyz, q1.xyz, q2.xyz, of.yzw, of.x, q0.w, at + 12u, words[at + 7u]);
     Place place = placeOf(p, piece.position);
     mat3 a = factorOf(piece.axis, piece.shear);
     Ellipse e = ellipseAt(place, a, piece.w, s.variance, piece.weight);
     vec4 t = vec4(0.0);
     for (uint g = 0u; g < (piece.counts >> 16 & 255u); ++g) {
-      vec4 growth = fourAt(at + 28u + 4u * g);
+      vec4 growth = fourAt(at + 24u + 4u * g);
       t += skewOfAxis(vec2(dot(place.row0, growth.xyz), dot(place.row1, growth.xyz)), growth.w, e);
     }
     best = max(best, drawPiece(slot, room, p, s, piece, packSkew(t)));
@@ -381,14 +395,15 @@ void main() {
   if (thread < FATES) group_fates[thread] = 0u;
   memoryBarrierShared();
   barrier();
-  uvec4 group = number < group_count ? groups[number] : uvec4(0u);
+  uvec4 group = number < group_count ? groups[first_group + number] : uvec4(0u);
   if (thread < group.z) {
     uint fate = number < groups_of_splats ? project(group, thread) : projectPieces(group, thread);
     atomicAdd(group_fates[fate], 1u);
   }
   memoryBarrierShared();
   barrier();
-  if (thread < FATES && group_fates[thread] > 0u) atomicAdd(fates[thread], group_fates[thread]);
+  bool is_counted = (parts[PART_VECTORS * group.x + 4u].z >> 9 & 1u) != 0u;
+  if (is_counted && thread < FATES && group_fates[thread] > 0u) atomicAdd(fates[thread], group_fates[thread]);
 }
 )";
 

@@ -16,8 +16,9 @@ namespace {
 constexpr const char* kInputs = R"(
 layout(local_size_x = THREADS) in;
 layout(std430, binding = 0) writeonly buffer Splats { uvec4 splats[]; };  // four a ScreenSplat
-layout(std430, binding = 1) readonly buffer Bricks { uint words[]; };
-layout(std430, binding = 2) readonly buffer Parts { uvec4 parts[]; };    // PART_VECTORS a ShaderPart
+layout(std430, binding = 1) readonly buffer Geometry { uint words[]; };
+layout(std430, binding = 6) readonly buffer Values { uint values[]; };
+layout(std430, binding = 2) readonly buffer Parts { uvec4 parts[]; };    // PART_VECTORS a ShaderPart; then clip planes
 layout(std430, binding = 3) readonly buffer Groups { uvec4 groups[]; };  // ShaderGroup
 layout(std430, binding = 4) buffer Fates { uint fates[]; };              // off screen, transparent, drawn, in pieces, clipped, hidden
 layout(std430, binding = 5) readonly buffer Frames { float frames[]; };  // growthFrames()
@@ -27,7 +28,7 @@ uniform ivec3 lattice_nodes;    // of ShadowGrid, behind those; 0: none
 uniform vec4 nodes_per_unit;
 uniform uint group_count;
 uniform uint groups_of_splats;  // the others are of splats in pieces
-uniform uint stored_arrays;     // of a brick
+uniform uint first_group;
 uniform float reach;  // of SplatChooser
 uniform bool per_pixel;
 uniform float largest_scalar;
@@ -217,6 +218,7 @@ uint firstKey(vec2 at, Ellipse e, inout uint key, inout vec2 slope) {
 }
 
 #define OF(array) uintBitsToFloat(words[at + uint(array) * n])
+#define VALUE_OF(array) uintBitsToFloat(values[of + uint(array) * n])
 
 // The place of a splat on the screen, and the map that is linear there: a PlacedPiece, with its depth as BrickProjector::depths().
 struct Place {
@@ -339,9 +341,10 @@ std::string projectShader(bool perspective) {
       "#define SKEW_OF_GROWTH {:.9g}\n#define MOST_KEY {}\n",
       kGrowthFrameShift, (1u << kGrowthFrameBits) - 1, kGrowthBits, kGrowthStep, kSkewOfGrowth,
       INT32_MAX / 2);
-  const std::string sizes =
-      fmt::format("#define PART_VECTORS {}u\n#define FATES {}u\n#define CUT_REACH {:.9g}\n",
-                  sizeof(ShaderPart) / 16, kFates, ScreenCut::kReach);
+  const std::string sizes = fmt::format(
+      "#define PART_VECTORS {}u\n#define FATES {}u\n#define CUT_REACH {:.9g}\n#define GEOMETRY_ARRAYS {}u\n"
+      "#define VALUE_ARRAYS {}u\n",
+      sizeof(ShaderPart) / 16, kFates, ScreenCut::kReach, kGeometryArrays, kValueArrays);
   return fmt::format("#version 430 core\n{}{}{}{}{}{}{}{}", constants, growth, sizes, splatUniforms(),
                      kInputs, pieceInputs(), kProject, pieceFunctions());
 }

@@ -22,7 +22,6 @@ StoredPiece storedPiece(const SplatPiece& piece) {
   out.x = piece.position.x;
   out.y = piece.position.y;
   out.z = piece.position.z;
-  out.mean = piece.mean;
   out.axis0 = s.axis0;
   out.axis1 = s.axis1;
   out.axis2 = s.axis2;
@@ -31,9 +30,6 @@ StoredPiece storedPiece(const SplatPiece& piece) {
   out.shear20 = s.shear20;
   out.shear21 = s.shear21;
   out.counts = static_cast<uint32_t>(piece.faces.count) | static_cast<uint32_t>(piece.growth.count) << 16;
-  out.slope0 = piece.slope.w0;
-  out.slope1 = piece.slope.w1;
-  out.slope2 = piece.slope.w2;
   for (size_t n = 0; n < static_cast<size_t>(piece.faces.count); ++n) {
     const CutFace& face = piece.faces.face[n];
     out.faces[n] = {face.inward.x, face.inward.y, face.inward.z, face.distance};
@@ -59,9 +55,13 @@ std::optional<BrickPieces> dividedBy(const BorderStyle& borders, const GeometryA
     const SplatPiece whole = wholeOf(geometry, values, i);
     const size_t count = partsAtBorder(whole, inward, layersOf(code), borders, parts);
     const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
-    out.splats.push_back({i, static_cast<uint32_t>(out.pieces.size()), static_cast<uint32_t>(count),
-                          static_cast<float>(drawnSlope(slope, inward))});
-    for (size_t n = 0; n < count; ++n) out.pieces.push_back(storedPiece(parts[n]));
+    out.splats.push_back({i, static_cast<uint32_t>(out.pieces.size()), static_cast<uint32_t>(count)});
+    out.drawn_slopes.push_back(static_cast<float>(drawnSlope(slope, inward)));
+    for (size_t n = 0; n < count; ++n) {
+      const SplatPiece& piece = parts[n];
+      out.pieces.push_back(storedPiece(piece));
+      out.values.push_back({piece.mean, piece.slope.w0, piece.slope.w1, piece.slope.w2});
+    }
     const bool has_faces = inward.faces != 0 || layersOf(code) != 0;
     further += has_faces ? 2 * count - 1 : count;  // as choosePieces() in projection.cpp counts them
     if (further > BrickProjector::kMaxPieces) return {};
@@ -76,7 +76,7 @@ BrickPieces BrickPieces::of(const GeometryArrays<const float>& geometry,
   if (auto divided = dividedBy(borders, geometry, values)) return *std::move(divided);
   if (isOfPairs(borders))
     if (auto divided = dividedBy(kWholeCellStyle, geometry, values)) return *std::move(divided);
-  return {{}, {}, true};
+  return {{}, {}, {}, {}, true};
 }
 
 uint32_t BrickStore::clipsOf(const Brick& brick, const ProjectionSettings& settings) {

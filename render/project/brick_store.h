@@ -18,6 +18,7 @@
 
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
+#include "stream/cache/series.h"
 #include "stream/model/octree.h"
 #include "stream/model/splats.h"
 
@@ -27,6 +28,7 @@ namespace curvisplat {
 struct StoredPart {
   uint32_t brick = 0;
   size_t splats = 0;  // splats of the whole brick
+  std::array<uint32_t, 8> octant_splats{};
   SplatRanges ranges;
   glm::dvec3 cell_min;
   KeyRange keys;
@@ -43,31 +45,36 @@ struct StoredPart {
   size_t otherRecords() const { return (layered ? 1u : 0u) + (coloured ? 1u : 0u); }
 };
 
-/// A piece of a splat at a border as the card reads it, in ten vectors of four numbers. Its own faces are at most
-/// kMaxFaces; clip planes add others when it is drawn.
+/// A piece of a splat at a border as the card reads it, in nine vectors of four numbers. Its own faces are at most
+/// kMaxFaces; clip planes add others when it is drawn. It does not depend on the splats' scalar.
 struct StoredPiece {
   static constexpr size_t kMaxFaces = 3;
 
-  float x, y, z, mean;
-  float axis0, axis1, axis2, weight;  // of its Shape
-  float shear10, shear20, shear21;
-  uint32_t counts;  // bits 0-7: faces; 8-15: bit n of a face that is edge_on; 16-23: axes of growth
-  float slope0, slope1, slope2, unused;
+  float x, y, z, weight;
+  float axis0, axis1, axis2;  // of its Shape
+  uint32_t counts;            // bits 0-7: faces; 8-15: bit n of a face that is edge_on; 16-23: axes of growth
+  float shear10, shear20, shear21, unused;
   std::array<std::array<float, 4>, kMaxFaces> faces;  // CutFace: inward, distance
   std::array<std::array<float, 4>, 3> growth;         // GrowthAxes: along, growth
 };
-static_assert(sizeof(StoredPiece) == 160);
+static_assert(sizeof(StoredPiece) == 144);
+
+/// The scalar of a piece.
+struct StoredPieceValues {
+  float mean, slope0, slope1, slope2;
+};
 
 /// The splats of a brick that are drawn in pieces (splat_pieces.h), and those.
 struct BrickPieces {
   struct Splat {
     uint32_t number;         // in the brick
     uint32_t first, pieces;  // in `pieces`
-    float drawn_slope;
   };
-  std::vector<Splat> splats;  // in the brick's order
+  std::vector<Splat> splats;        // in the brick's order
+  std::vector<float> drawn_slopes;  // [splat] of their scalar
   std::vector<StoredPiece> pieces;
-  bool has_too_many = false;  // then there are none, and splats at borders are drawn as any other
+  std::vector<StoredPieceValues> values;  // [piece]
+  bool has_too_many = false;              // then there are none, and splats at borders are drawn as any other
 
   /// Divides the splats at borders as BrickProjector does. If the whole brick would have more than its kMaxPieces pieces,
   /// cells at faces are one splat instead of two, and if that does not help, splats at borders are drawn as any other.
@@ -79,22 +86,23 @@ class BrickStore {
  public:
   virtual ~BrickStore() = default;
 
-  /// Removes all bricks if `content` differs from the number given last. Each cache, step, variable and pair of
-  /// variables has a number of its own.
-  virtual void open(uint64_t content) = 0;
+  /// Says which values bricks are drawn with from now on. Removes all bricks if `content` differs from the number given
+  /// last: each geometry of a cache, with each variable or pair of variables, has a number of its own. All values of its steps
+  /// stay, as long as there is space for them.
+  virtual void open(uint64_t content, const StepPosition& step) = 0;
   /// Reserves space in `bytes` of the card's memory for the bricks of the parts and for their projected
   /// splats. Returns how many parts, from the first on, fit as far as the store knows: only a brick that was
   /// put there tells how many pieces it has. If all of those parts are stored, the number depends on the
-  /// arguments alone. Throws Error if the card refuses the memory.
+  /// arguments alone. Where the card refuses the memory, fewer fit from then on.
   virtual size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) = 0;
   /// The default for `bytes` of makeRoom(): a share of the card's free memory; 0 if OpenGL draws on the
   /// processor.
   virtual uint64_t defaultBytes() const = 0;
   virtual bool has(uint32_t brick) const = 0;
-  /// Adds a brick. Bricks that no part of the last makeRoom() needs may be evicted for it. If there is no free
+  /// Adds the brick of a part: its geometry if that is missing, and its values at the step. Bricks that no part of the last makeRoom() needs may be evicted for it. If there is no free
   /// range for it all the same, the brick is not stored, which has() tells; the next makeRoom() empties the store.
-  virtual void put(uint32_t brick, const GeometryArrays<const float>& geometry, const BrickValues& values,
-                   const BrickPieces& pieces) = 0;
+  virtual void put(const StoredPart& part, const GeometryArrays<const float>& geometry,
+                   const BrickValues& values, const BrickPieces& pieces) = 0;
   /// Whether the brick can be drawn from a store in a picture of this view: perspective may not cut its splats.
   /// Positions of its splats are relative to `cell_min`.
   static bool canDraw(const Brick& brick, const glm::dvec3& cell_min, const ScreenView& view);
