@@ -11,13 +11,19 @@
 namespace curvisplat {
 namespace {
 
+/// " (<why>)", or nothing.
+std::string inBrackets(const std::string& why) {
+  return why.empty() ? why : fmt::format(" ({})", why);
+}
+
 class GlBackend final : public PaintingBackend {
  public:
   enum class Way { kQuads, kTilesOrQuads };
 
-  GlBackend(GlLibrary library, Way way)
+  /// `why`: this one and no better; empty: it is what was asked for.
+  GlBackend(GlLibrary library, Way way, const std::string& why = {})
       : gl_(library), capacity_(GlTilePainter::Capacity::of(gl_.isSoftware())) {
-    gl_.run([&](const GlContext& context) { makePainter(context, way); });
+    gl_.run([&](const GlContext& context) { makePainter(context, way, why); });
   }
   ~GlBackend() override {
     gl_.run([this](const GlContext&) { painter_.reset(); });
@@ -27,14 +33,15 @@ class GlBackend final : public PaintingBackend {
   }
   const std::string& name() const override { return name_; }
   bool isSoftware() const override { return gl_.isSoftware(); }
+  Backend next() const override { return tiles_ ? Backend::kEglQuads : Backend::kCpu; }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
     return tiles_ ? GlTilePainter::bytes(size, resources, capacity_) : GlPainter::bytes(size, resources);
   }
 
  private:
-  void makePainter(const GlContext& context, Way way) {
+  void makePainter(const GlContext& context, Way way, const std::string& why) {
     name_ = context.name();
-    std::string why_quads;
+    std::string why_quads = inBrackets(why);
     if (way == Way::kTilesOrQuads) {
       try {
         painter_ = std::make_unique<GlTilePainter>(context, capacity_);
@@ -42,7 +49,7 @@ class GlBackend final : public PaintingBackend {
         name_ += ", compute shaders";
         return;
       } catch (const Error& error) {
-        why_quads = fmt::format(" ({})", error.what());
+        why_quads = inBrackets(error.what());
       }
     }
     name_ += ", quads" + why_quads;
@@ -59,6 +66,7 @@ class GlBackend final : public PaintingBackend {
 /// Paints on the caller's thread and on TBB's threads.
 class CpuBackend final : public PaintingBackend {
  public:
+  explicit CpuBackend(const std::string& why = {}) : name_(CpuPainter::name() + inBrackets(why)) {}
   void run(const Job& job) override { job(painter_); }
   const std::string& name() const override { return name_; }
   bool isSoftware() const override { return true; }
@@ -68,7 +76,7 @@ class CpuBackend final : public PaintingBackend {
 
  private:
   CpuPainter painter_;
-  const std::string name_ = CpuPainter::name();
+  const std::string name_;
 };
 
 /// EGL if it draws on a graphics card. Otherwise returns null and sets `why_not`.
@@ -105,6 +113,19 @@ std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
   std::string why_not;
   if (auto card = makeCardBackend(why_not)) return card;
   return std::make_unique<CpuBackend>();
+}
+
+void replaceFailed(std::unique_ptr<PaintingBackend>& backend, const std::string& why) {
+  const bool has_quads = backend->next() == Backend::kEglQuads;
+  backend.reset();
+  if (has_quads) {
+    try {
+      backend = std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kQuads, why);
+      return;
+    } catch (const Error&) {  // the processor always draws
+    }
+  }
+  backend = std::make_unique<CpuBackend>(why);
 }
 
 SystemReport examineBackends() {

@@ -38,12 +38,18 @@ class PaintingBackend {
   virtual const std::string& name() const = 0;
   /// Whether the processor draws, either directly or through a software OpenGL.
   virtual bool isSoftware() const = 0;
+  /// The backend that draws where this one cannot go on.
+  virtual Backend next() const { return Backend::kCpu; }
   /// Memory in bytes that a frame of this size takes in addition to the resulting image.
   virtual uint64_t bytes(ImageSize size, const PaintResources& resources) const = 0;
 };
 
 /// Throws Error if the backend is not available; the message names the library that was tried and its error.
 std::unique_ptr<PaintingBackend> makeBackend(Backend backend);
+
+/// Replaces a backend that OpenGL has failed by the next one that this machine has: quads instead of compute shaders, then the
+/// processor. Its name tells `why`.
+void replaceFailed(std::unique_ptr<PaintingBackend>& backend, const std::string& why);
 
 /// The result of trying one backend on this machine.
 struct BackendReport {

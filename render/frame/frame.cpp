@@ -6,6 +6,7 @@
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_pipeline.h"
 #include "render/frame/frame_plan.h"
+#include "render/project/painter_failure.h"
 #include "render/project/screen_splat.h"
 #include "render/ranks/picture_shares.h"
 #include "stream/base/compute_permits.h"
@@ -28,6 +29,26 @@ struct FrameRenderer::State {
         scalars(scalars_),
         planner(cache_, scalars_),
         pipeline(cache_, scalars_, planner, backend) {}
+  State(const CacheReader& cache_, const DrawnScalars& scalars_, std::unique_ptr<PaintingBackend> backend)
+      : cache(cache_),
+        scalars(scalars_),
+        planner(cache_, scalars_),
+        pipeline(cache_, scalars_, planner, std::move(backend)) {}
+
+  /// Draws by the next backend where one cannot go on. Ranks would have to agree on it.
+  template <typename Draw>
+  Image withBackends(const FrameOptions& options, const Draw& draw) {
+    for (;;) {
+      std::string why;
+      try {
+        return draw();
+      } catch (const PainterFailure& failure) {
+        if (options.ranks) throw;
+        why = failure.what();
+      }
+      pipeline.fallBack(why);
+    }
+  }
 
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress) {
@@ -123,6 +144,10 @@ struct FrameRenderer::State {
 FrameRenderer::FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend)
     : state_(std::make_unique<State>(cache, scalars, backend)) {}
 
+FrameRenderer::FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars,
+                             std::unique_ptr<PaintingBackend> backend)
+    : state_(std::make_unique<State>(cache, scalars, std::move(backend))) {}
+
 FrameRenderer::~FrameRenderer() = default;
 
 ComputePermits* FrameRenderer::permits() const {
@@ -140,13 +165,14 @@ bool FrameRenderer::drawsInSoftware() const {
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
   state_->pipeline.endPrefetch();
-  return state_->render(camera, options, statistics, progress);
+  return state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); });
 }
 
 Image FrameRenderer::renderWithValues(const Camera& camera, const FrameOptions& options,
                                       FrameStatistics& statistics, PixelValues& values, Progress* progress) {
   state_->pipeline.endPrefetch();
-  return state_->renderWithValues(camera, options, statistics, values, progress);
+  return state_->withBackends(
+      options, [&] { return state_->renderWithValues(camera, options, statistics, values, progress); });
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
@@ -154,17 +180,21 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
                                         Progress* progress) {
   state_->pipeline.endPrefetch();
   bool is_final = false;
-  Image picture = state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, progress);
+  Image picture = state_->withBackends(options, [&] {
+    return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, progress);
+  });
   show(picture, is_final);
   if (is_final) return;
   picture = Image();
-  show(state_->render(camera, options, statistics, progress), true);
+  show(state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); }),
+       true);
 }
 
 Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options,
                                    const QuickLimits& limits, FrameStatistics& statistics, bool& is_final) {
   state_->pipeline.endPrefetch();
-  return state_->renderQuickly(camera, options, limits, statistics, is_final, nullptr);
+  return state_->withBackends(
+      options, [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, nullptr); });
 }
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {

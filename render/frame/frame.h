@@ -48,6 +48,9 @@ class FrameRenderer {
       : FrameRenderer(cache, DrawnScalars(variable, transfer_function), backend) {}
   /// Draws pictures of one scalar or two. Throws Error as the other constructor.
   FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend = Backend::kAutomatic);
+  /// Draws by this backend, as long as it can.
+  FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars,
+                std::unique_ptr<PaintingBackend> backend);
   ~FrameRenderer();
 
   /// Draws one frame. Throws UsageError for an invalid view, and for too little memory or too small a
@@ -102,7 +105,8 @@ class FrameRenderer {
   /// frame.
   ComputePermits* permits() const;
 
-  /// Name of the backend: "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  /// Name of the backend: "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5". Once OpenGL has failed
+  /// while a frame was drawn, another one draws, whose name says why.
   const std::string& backendName() const;
   /// Whether the processor draws, either directly or through a software OpenGL.
   bool drawsInSoftware() const;

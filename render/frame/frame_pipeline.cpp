@@ -162,6 +162,18 @@ void FramePipeline::release() {
   dropPools();
 }
 
+void FramePipeline::fallBack(const std::string& why) {
+  endPrefetch();
+  dropPools();
+  hidden_.ask(nullptr);
+  stored_.clear();
+  is_stored_.clear();
+  unread_.clear();
+  is_storing_ = false;
+  replaceFailed(backend_, why);
+  painting_ = backend_.get();
+}
+
 void FramePipeline::stepChanged() {
   layers_.stepChanged();
   if (pools_) pools_->source.stepChanged();
@@ -431,6 +443,8 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.gl_paint_s = card.paint_s;
     statistics.card_entries = card.entries;
     statistics.card_peak_bytes = card.bytes;
+    statistics.card_sent_bytes = card.sent_bytes;
+    statistics.card_slabs = card.slabs;
     if (!stored_.empty()) add(statistics, painter.store()->counts());
   });
   if (const ShadowGrid* const shadows = plan.settings.shadows.get()) {

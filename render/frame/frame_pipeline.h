@@ -137,6 +137,9 @@ class FramePipeline {
   /// Gives its memory up until the next frame. Nothing may be drawn meanwhile.
   void release();
 
+  /// Draws the frames to come by the next backend (replaceFailed()), after a PainterFailure. Nothing may be drawn meanwhile.
+  void fallBack(const std::string& why);
+
   /// The cache is at another step of the same geometry. Nothing may be drawn or fetched meanwhile.
   void stepChanged();
 
@@ -173,7 +176,7 @@ class FramePipeline {
   const size_t variable_;
   const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
-  const std::unique_ptr<PaintingBackend> backend_;
+  std::unique_ptr<PaintingBackend> backend_;
   PaintingBackend* painting_;  // backend_, except in drawBy()
   uint64_t aside_bytes_ = 0;
   size_t aside_waiting_splats_ = 0;

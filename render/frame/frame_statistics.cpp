@@ -63,7 +63,7 @@ constexpr Fields<PrepareStatistics, 19> kPrepare{{
     {"sweep_peak_bytes", &PrepareStatistics::sweep_peak_bytes},
 }};
 
-constexpr Fields<DrawStatistics, 15> kDraw{{
+constexpr Fields<DrawStatistics, 17> kDraw{{
     {"upload", &DrawStatistics::upload_s, Combined::kSum, kSeconds},
     {"draw", &DrawStatistics::draw_s, Combined::kSum, kSeconds},
     {"gl_draw", &DrawStatistics::gl_draw_s, Combined::kSum, kSeconds},
@@ -74,6 +74,8 @@ constexpr Fields<DrawStatistics, 15> kDraw{{
     {"card_entries", &DrawStatistics::card_entries},
     {"card_splats", &DrawStatistics::card_splats},
     {"card_peak_bytes", &DrawStatistics::card_peak_bytes},
+    {"card_sent_bytes", &DrawStatistics::card_sent_bytes},
+    {"card_slabs", &DrawStatistics::card_slabs},
     {"painter_waited", &DrawStatistics::painter_waited_s, Combined::kSum, kSeconds},
     {"splats_hidden", &DrawStatistics::splats_hidden},
     {"surfaces", &DrawStatistics::surfaces_s, Combined::kSum, kSeconds},

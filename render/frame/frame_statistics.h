@@ -60,6 +60,7 @@ struct DrawStatistics {
   double gl_project_s = 0, gl_list_s = 0, gl_sort_s = 0, gl_paint_s = 0;
   uint64_t card_entries = 0, card_peak_bytes = 0;  // CardWork
   uint64_t card_splats = 0;                        // of bricks that stay on the card: read there
+  uint64_t card_sent_bytes = 0, card_slabs = 0;    // CardWork
   double painter_waited_s = 0;                     // for the workers
   uint64_t splats_hidden = 0;  // left out behind others that are opaque; how many varies, as bricks_hidden
   double surfaces_s = 0;       // surfaces and slices, without reading and sampling bricks for slices

@@ -38,7 +38,7 @@ size_t splatsOf(const StoredPart& part) {
 
 CardBricks::CardBricks(const GlFunctions& gl, uint64_t buffer_bytes)
     : gl_(gl),
-      largest_(std::min(buffer_bytes, CardBuffer::largest(gl))),
+      largest_(std::min(buffer_bytes, CardBuffer::largest(gl)) / kWordBytes * kWordBytes),
       parts_(gl),
       groups_(gl),
       fates_(gl),
@@ -160,7 +160,8 @@ bool CardBricks::addPage(uint64_t wanted_bytes) {
     pages_.emplace_back(gl_).reserve(bytes);
   } catch (const Error&) {
     pages_.pop_back();
-    granted_bytes_ = pageBytes();
+    constexpr uint64_t kMinPageBytes = uint64_t{64} << 10;
+    granted_bytes_ = pageBytes() + (bytes > kMinPageBytes ? bytes / 2 : 0);
     return false;
   }
   places_.addPage(bytes / kWordBytes);

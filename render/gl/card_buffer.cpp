@@ -1,15 +1,40 @@
 #include "render/gl/card_buffer.h"
 
-#include "stream/base/error.h"
+#include <algorithm>
+#include <array>
+
+#include "render/project/painter_failure.h"
 
 namespace curvisplat {
+
+namespace {
+
+constexpr GLenum kFreeMemoryNvidia = 0x9049,
+                 kFreeMemoryAti = 0x87FC;  // GL_NVX_gpu_memory_info, GL_ATI_meminfo
+
+}  // namespace
+
+uint64_t defaultCardBytes(const GlFunctions& gl, uint64_t available_bytes) {
+  // A context that is lost may say so for ever.
+  for (int n = 0; n < 100 && gl.GetError() != GL_NO_ERROR; ++n) {
+  }
+  std::array<GLint, 4> kibibytes{};
+  for (const GLenum name : {kFreeMemoryNvidia, kFreeMemoryAti}) {
+    gl.GetIntegerv(name, kibibytes.data());
+    if (gl.GetError() == GL_NO_ERROR && kibibytes[0] > 0)
+      return uint64_t{768} * static_cast<uint64_t>(kibibytes[0]);
+  }
+  constexpr uint64_t kUntold = uint64_t{768} << 20;
+  return available_bytes > 0 ? std::min(kUntold, available_bytes / 8) : kUntold;
+}
 
 void CardBuffer::reserve(uint64_t bytes) {
   if (bytes <= bytes_) return;
   const uint64_t most = largest(gl_);
   if (bytes > most)
-    throw Error("this OpenGL has no buffers of {} MiB (at most {}); give --backend egl-quads, or cpu",
-                bytes >> 20, most >> 20);
+    throw PainterFailure(
+        "this OpenGL has no buffers of {} MiB (at most {}); give --backend egl-quads, or cpu", bytes >> 20,
+        most >> 20);
   bytes_ = 0;
   bind();
   gl_.BufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_COPY);

@@ -8,12 +8,17 @@
 
 namespace curvisplat {
 
+/// The card's memory that is taken for bricks unless told otherwise: three quarters of what is free there. Where the driver
+/// does not tell, or knows of no memory of the card's own, as with cards that share the processor's: 768 MiB, but no more
+/// than an eighth of the processor's `available_bytes` (0: unknown).
+uint64_t defaultCardBytes(const GlFunctions& gl, uint64_t available_bytes);
+
 /// A shader storage buffer that grows as needed. Growing loses its contents.
 class CardBuffer {
  public:
   explicit CardBuffer(const GlFunctions& gl) : gl_(gl), object_(makeBuffer(gl)) {}
 
-  /// Makes the buffer at least this large. Throws Error if the card lacks the memory, or OpenGL the kind of
+  /// Makes the buffer at least this large. Throws PainterFailure if the card lacks the memory, or OpenGL the kind of
   /// buffer.
   void reserve(uint64_t bytes);
   /// Frees the memory.

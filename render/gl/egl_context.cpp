@@ -159,17 +159,9 @@ class CurrentContext {
       return failed("has no configuration for OpenGL");
     // Compute shaders come with 4.3.
     EGLContext context = EGL_NO_CONTEXT;
-    for (const EGLint major : {4, 3}) {
-      const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                                   major,
-                                   EGL_CONTEXT_MINOR_VERSION,
-                                   3,
-                                   EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                   EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                   EGL_NONE};
-      context = egl_.create_context(display, config, EGL_NO_CONTEXT, attributes);
-      if (context != EGL_NO_CONTEXT) break;
-    }
+    for (const EGLint major : {4, 3})
+      for (const bool tells_of_resets : {true, false})
+        if (context == EGL_NO_CONTEXT) context = contextOf(display, config, major, tells_of_resets);
     if (context == EGL_NO_CONTEXT) return failed("no context");
     if (!egl_.make_current(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) {
       std::string failure = failed("its context cannot be made current");
@@ -180,6 +172,20 @@ class CurrentContext {
     context_ = context;
     name_ = "EGL " + platform.name;
     return {};
+  }
+
+  /// A core context of this version, dot 3, or EGL_NO_CONTEXT. Not all drivers can tell of a card that was reset.
+  EGLContext contextOf(EGLDisplay display, EGLConfig config, EGLint major, bool tells_of_resets) const {
+    const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                 major,
+                                 EGL_CONTEXT_MINOR_VERSION,
+                                 3,
+                                 EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                 EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                 tells_of_resets ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY : EGL_NONE,
+                                 EGL_LOSE_CONTEXT_ON_RESET,
+                                 EGL_NONE};
+    return egl_.create_context(display, config, EGL_NO_CONTEXT, attributes);
   }
 
   Egl egl_;

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "render/project/painter_failure.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -35,13 +36,20 @@ GlFunctions::GlFunctions(const Lookup& lookup) {
 #define CURVISPLAT_GL_FETCH(name, type) name = reinterpret_cast<type>(lookup("gl" #name));
   CURVISPLAT_GL_4_3_FUNCTIONS(CURVISPLAT_GL_FETCH)
 #undef CURVISPLAT_GL_FETCH
+  if (isAtLeast(4, 5))
+    GetGraphicsResetStatus =
+        reinterpret_cast<PFNGLGETGRAPHICSRESETSTATUSPROC>(lookup("glGetGraphicsResetStatus"));
 }
 
-std::string GlFunctions::whyNoCompute() const {
+bool GlFunctions::isAtLeast(int wanted_major, int wanted_minor) const {
   GLint major = 0, minor = 0;
   GetIntegerv(GL_MAJOR_VERSION, &major);
   GetIntegerv(GL_MINOR_VERSION, &minor);
-  if (major < 4 || (major == 4 && minor < 3)) return "compute shaders need OpenGL 4.3";
+  return major > wanted_major || (major == wanted_major && minor >= wanted_minor);
+}
+
+std::string GlFunctions::whyNoCompute() const {
+  if (!isAtLeast(4, 3)) return "compute shaders need OpenGL 4.3";
 #define CURVISPLAT_GL_HAS(name, type) \
   if (!name) return "this OpenGL has no gl" #name;
   CURVISPLAT_GL_4_3_FUNCTIONS(CURVISPLAT_GL_HAS)
@@ -52,11 +60,16 @@ std::string GlFunctions::whyNoCompute() const {
 void GlFunctions::check(std::string_view doing) const {
   const GLenum error = GetError();
   if (error == GL_OUT_OF_MEMORY)
-    throw Error(
+    throw PainterFailure(
         "OpenGL has no memory left for {}; give --backend cpu, or end what else uses the graphics card",
         doing);
   if (error != GL_NO_ERROR)
-    throw Error("OpenGL failed while {}: {} (0x{:04x})", doing, errorName(error), error);
+    throw PainterFailure("OpenGL failed while {}: {} (0x{:04x})", doing, errorName(error), error);
+}
+
+void GlFunctions::checkReset(std::string_view doing) const {
+  if (GetGraphicsResetStatus && GetGraphicsResetStatus() != GL_NO_ERROR)
+    throw PainterFailure("the graphics card was reset while {}", doing);
 }
 
 namespace {
@@ -87,7 +100,7 @@ class Shader {
     const char* const word = kind == GL_VERTEX_SHADER     ? "vertex"
                              : kind == GL_FRAGMENT_SHADER ? "fragment"
                                                           : "compute";
-    throw Error("OpenGL cannot compile the {} shader: {}", word, said);
+    throw PainterFailure("OpenGL cannot compile the {} shader: {}", word, said);
   }
   ~Shader() { gl_.DeleteShader(name_); }
   Shader(const Shader&) = delete;
@@ -124,7 +137,7 @@ void GlProgram::link() {
   if (linked) return;
   const std::string said = firstLine(gl_->GetProgramInfoLog, name_);
   gl_->DeleteProgram(name_);
-  throw Error("OpenGL cannot link the shaders: {}", said);
+  throw PainterFailure("OpenGL cannot link the shaders: {}", said);
 }
 
 GlProgram::~GlProgram() {

@@ -112,6 +112,9 @@ struct GlFunctions {
   CURVISPLAT_GL_4_3_FUNCTIONS(CURVISPLAT_GL_MEMBER)
 #undef CURVISPLAT_GL_MEMBER
 
+  /// Null before OpenGL 4.5.
+  PFNGLGETGRAPHICSRESETSTATUSPROC GetGraphicsResetStatus = nullptr;
+
   using Lookup = std::function<void*(const char* name)>;
   /// Throws Error naming the first function that `lookup` does not know.
   explicit GlFunctions(const Lookup& lookup);
@@ -120,8 +123,14 @@ struct GlFunctions {
   /// contexts refuse.
   std::string whyNoCompute() const;
 
-  /// Throws Error if a call has failed since the last check: "OpenGL failed while <doing>: <error>".
+  /// Throws PainterFailure if a call has failed since the last check: "OpenGL failed while <doing>: <error>".
   void check(std::string_view doing) const;
+  /// Throws PainterFailure if the card was reset, so that what was drawn is lost; only contexts know that were asked to
+  /// tell.
+  void checkReset(std::string_view doing) const;
+
+ private:
+  bool isAtLeast(int major, int minor) const;
 };
 
 /// Owns a name that glGen...(1, &name) made, and passes it to glDelete...(1, &name) at the end.

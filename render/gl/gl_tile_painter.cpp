@@ -15,6 +15,7 @@
 #include "render/project/splat_chooser.h"
 #include "render/project/tile_key.h"
 #include "stream/base/error.h"
+#include "stream/base/os.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -24,22 +25,6 @@ namespace {
 constexpr size_t kMaxRecords = 3;
 enum : size_t { kPaint = GlTileLists::kOtherStages, kProject, kStages };
 constexpr int kGroupSide = 8;  // of splatTileShader()
-
-constexpr GLenum kFreeMemoryNvidia = 0x9049,
-                 kFreeMemoryAti = 0x87FC;  // GL_NVX_gpu_memory_info, GL_ATI_meminfo
-
-/// Three quarters of what the card has free; of 1 GiB where the driver does not tell.
-uint64_t defaultBytesOf(const GlFunctions& gl) {
-  while (gl.GetError() != GL_NO_ERROR) {
-  }
-  std::array<GLint, 4> kibibytes{};
-  for (const GLenum name : {kFreeMemoryNvidia, kFreeMemoryAti}) {
-    gl.GetIntegerv(name, kibibytes.data());
-    if (gl.GetError() == GL_NO_ERROR && kibibytes[0] > 0)
-      return uint64_t{768} * static_cast<uint64_t>(kibibytes[0]);
-  }
-  return uint64_t{768} << 20;
-}
 
 /// The lists of tiles take no more than a sixth of what bricks take by default, and no more than a buffer holds.
 GlTilePainter::Capacity within(const GlFunctions& gl, uint64_t default_bytes,
@@ -72,7 +57,7 @@ TileBox tilesOver(const TileBox& pixels, int side) {
 struct GlTilePainter::State final : BrickStore {
   State(const GlFunctions& functions, const Capacity& capacity_, bool software)
       : gl(functions),
-        default_bytes(software ? 0 : defaultBytesOf(functions)),
+        default_bytes(software ? 0 : defaultCardBytes(functions, os::availableMemory())),
         capacity(software ? capacity_ : within(functions, default_bytes, capacity_)),
         tables(gl),
         lists(gl, timers),
@@ -114,6 +99,8 @@ struct GlTilePainter::State final : BrickStore {
   std::unique_ptr<std::atomic<uint8_t>[]> hidden;  // [large tile]
   double upload_s = 0, draw_s = 0;
   uint64_t window_bytes = 0, most_bytes = 0;  // on the card
+  uint64_t sent_bytes = 0;                    // CardBricks::sentBytes() when the last picture ended
+  uint64_t frame_sent_bytes = 0;
 
   void open(uint64_t content, const StepPosition& step) override { bricks.open(content, step); }
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) override {
@@ -256,11 +243,7 @@ void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const 
       bricks.project(settings, keys, slabs[slab], tables, SplatChooser::largestScalar(*table), splats);
     });
   };
-  try {
-    splats.reserve((stored + kMaxRecords + capacity.splats) * sizeof(ScreenSplat));
-  } catch (const Error& error) {
-    throw Error("{}; give less --card-memory, or 0", error.what());
-  }
+  splats.reserve((stored + kMaxRecords + capacity.splats) * sizeof(ScreenSplat));
   slab = 0;
   project_slab();
 }
@@ -485,7 +468,10 @@ Image GlTilePainter::end() {
   } release{gl};
   const std::span<const float> drawn = state.readWindows();
   release.is_mapped = true;
+  gl.checkReset("drawing");
   state.timers.finish();
+  state.frame_sent_bytes = state.bricks.sentBytes() - state.sent_bytes;
+  state.sent_bytes = state.bricks.sentBytes();
   return state.tables.composite(drawn, false, state.background, state.threads);
 }
 
@@ -505,8 +491,15 @@ CardWork GlTilePainter::cardWork() const {
   const GlTimers& timers = state_->timers;
   const double list_s = timers.seconds(GlTileLists::kList), sort_s = timers.seconds(GlTileLists::kSort),
                paint_s = timers.seconds(kPaint), project_s = timers.seconds(kProject);
-  return {project_s + list_s + sort_s + paint_s, project_s,         list_s, sort_s, paint_s,
-          state_->lists.listedEntries(),         state_->most_bytes};
+  return {project_s + list_s + sort_s + paint_s,
+          project_s,
+          list_s,
+          sort_s,
+          paint_s,
+          state_->lists.listedEntries(),
+          state_->most_bytes,
+          state_->frame_sent_bytes,
+          state_->slabs.size()};
 }
 
 uint64_t GlTilePainter::bytes(ImageSize size, const PaintResources& resources, const Capacity& capacity) {

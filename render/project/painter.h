@@ -56,8 +56,10 @@ struct PixelShading {
 struct CardWork {
   double draw_s = 0;  // all of it
   double project_s = 0, list_s = 0, sort_s = 0, paint_s = 0;
-  uint64_t entries = 0;  // splats in tiles, each once in every tile
-  uint64_t bytes = 0;    // the most memory that OpenGL's objects have taken so far
+  uint64_t entries = 0;     // splats in tiles, each once in every tile
+  uint64_t bytes = 0;       // the most memory that OpenGL's objects have taken so far
+  uint64_t sent_bytes = 0;  // of bricks that stay on the card: sent for this frame
+  uint64_t slabs = 0;       // of depth, in which stored bricks were projected
 };
 
 /// Draws the splats of a frame. One frame at a time.

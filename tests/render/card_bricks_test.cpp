@@ -1,5 +1,6 @@
 // Bricks that stay on the card: whatever stays there, a picture is the processor's but for rounding, and its bits depend
 // on nothing but the plan and the card's memory.
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -7,8 +8,14 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 
+#include "render/backend/backend.h"
 #include "render/frame/frame.h"
+#include "render/gl/card_buffer.h"
+#include "render/gl/gl_context.h"
+#include "render/gl/gl_tile_painter.h"
 #include "render/mesh/triangle_mesh.h"
 #include "render/project/brick_store.h"
 #include "render/surface/surface_scene.h"
@@ -244,6 +251,181 @@ TEST_F(CardBricksTest, StayAwayWithoutMemory) {
   EXPECT_EQ(statistics.card_splats, 0u);
   EXPECT_EQ(egl_->render(camera("iso"), options(1000), statistics).rgba, none.rgba);
   EXPECT_EQ(statistics.card_splats, 0u);
+}
+
+struct Faults {
+  int refusals = 0;  // of buffers of 100 kB and more
+  bool is_refusing = false, is_reset = false;
+};
+
+/// The painter in compute shaders, whose buffers and batches are smaller, and an OpenGL that fails when it is told to.
+class FailingBackend final : public PaintingBackend {
+ public:
+  static inline Faults faults;
+
+  explicit FailingBackend(uint64_t buffer_bytes = UINT64_MAX) {
+    faults = {};
+    thread_.run([&](const GlContext&) {
+      context_ = std::make_unique<Context>();
+      painter_ =
+          std::make_unique<GlTilePainter>(*context_, GlTilePainter::Capacity{1024, 1 << 17, buffer_bytes});
+    });
+  }
+  ~FailingBackend() override {
+    thread_.run([&](const GlContext&) {
+      painter_.reset();
+      context_.reset();
+    });
+  }
+  void run(const Job& job) override {
+    thread_.run([&](const GlContext&) { job(*painter_); });
+  }
+  const std::string& name() const override { return name_; }
+  bool isSoftware() const override { return true; }
+  Backend next() const override { return Backend::kEglQuads; }
+  uint64_t bytes(ImageSize, const PaintResources&) const override { return 1 << 20; }
+
+ private:
+  /// The thread's context, with some functions replaced.
+  class Context final : public GlContext {
+   public:
+    Context() : GlContext("failing", lookUp) {}
+
+   private:
+    static void* lookUp(const char* name) {
+      static void* const library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
+      using Get = void* (*)(const char*);
+      static const auto get = reinterpret_cast<Get>(dlsym(library, "eglGetProcAddress"));
+      static const auto buffer_data = reinterpret_cast<PFNGLBUFFERDATAPROC>(get("glBufferData"));
+      static const auto error = reinterpret_cast<PFNGLGETERRORPROC>(get("glGetError"));
+      const std::string_view wanted = name;
+      if (wanted == "glGetGraphicsResetStatus") {
+        const PFNGLGETGRAPHICSRESETSTATUSPROC status = [] {
+          return GLenum{faults.is_reset ? GLenum{GL_GUILTY_CONTEXT_RESET} : GLenum{GL_NO_ERROR}};
+        };
+        return reinterpret_cast<void*>(status);
+      }
+      if (wanted == "glBufferData") {
+        const PFNGLBUFFERDATAPROC data = [](GLenum target, GLsizeiptr bytes, const void* from, GLenum usage) {
+          faults.is_refusing = bytes >= 100'000 && faults.refusals > 0;
+          if (faults.is_refusing)
+            --faults.refusals;
+          else
+            buffer_data(target, bytes, from, usage);
+        };
+        return reinterpret_cast<void*>(data);
+      }
+      if (wanted == "glGetError") {
+        const PFNGLGETERRORPROC instead = [] {
+          return std::exchange(faults.is_refusing, false) ? GLenum{GL_OUT_OF_MEMORY} : error();
+        };
+        return reinterpret_cast<void*>(instead);
+      }
+      return get(name);
+    }
+  };
+
+  GlThread thread_{GlLibrary::kEgl};
+  std::unique_ptr<Context> context_;
+  std::unique_ptr<Painter> painter_;
+  const std::string name_ = "failing";
+};
+
+class FailingCard : public CardBricksTest {
+ protected:
+  std::unique_ptr<FrameRenderer> renderer(uint64_t buffer_bytes = UINT64_MAX) const {
+    return std::make_unique<FrameRenderer>(*cache_,
+                                           DrawnScalars(0, TransferFunction::preset("viridis", -1, 1, 0.02)),
+                                           std::make_unique<FailingBackend>(buffer_bytes));
+  }
+};
+
+TEST_F(FailingCard, ProjectsInSlabsWhatItsBuffersDoNotHoldAtOnce) {
+  writeLatticeCache(folder_ / "lattice.splats", -0.5, {0.03, 0.02, 0.01});  // four layers of bricks
+  open("lattice.splats");
+  FrameOptions large = options(64 * kMiB);
+  large.size = {600, 500};  // the depths in which tiles of 4 pixels may order splats are small
+  for (const char* view : {"iso", "+z"}) {
+    FrameStatistics whole, slabs;
+    const Image wanted = renderer()->render(camera(view), large, whole);
+    EXPECT_EQ(whole.card_splats, whole.splats_read);
+    EXPECT_EQ(whole.card_slabs, 1u);
+    bool is_divided = false;
+    for (const uint64_t buffer_bytes : {31 * kMiB / 8, 15 * kMiB / 4}) {
+      const Image image = renderer(buffer_bytes)->render(camera(view), large, slabs);
+      EXPECT_EQ(slabs.splats_drawn, whole.splats_drawn) << buffer_bytes;
+      EXPECT_EQ(slabs.splats_off_screen, whole.splats_off_screen) << buffer_bytes;
+      if (slabs.card_splats == whole.card_splats)
+        EXPECT_EQ(image.rgba, wanted.rgba) << buffer_bytes;
+      else
+        EXPECT_GE(compareImages(image, wanted).psnr_db, 60) << buffer_bytes;
+      is_divided |= slabs.card_splats == whole.card_splats && slabs.card_slabs > 1;
+    }
+    EXPECT_TRUE(is_divided) << view;
+  }
+}
+
+TEST_F(FailingCard, KeepsFewerBricksWhereItRefusesMemory) {
+  FrameStatistics statistics;
+  const auto card = renderer();
+  FailingBackend::faults.refusals = 2;
+  const Image image = card->render(camera("iso"), options(64 * kMiB), statistics);
+  EXPECT_EQ(FailingBackend::faults.refusals, 0);
+  EXPECT_GT(statistics.card_splats, 0u);
+  EXPECT_LT(statistics.card_splats, statistics.splats_read);
+  EXPECT_EQ(card->backendName(), "failing");
+  EXPECT_GE(
+      compareImages(image, rendererBy(Backend::kCpu)->render(camera("iso"), options(0), statistics)).psnr_db,
+      60);
+}
+
+TEST_F(FailingCard, LeavesItsPictureToQuadsOnceItWasReset) {
+  FrameStatistics statistics;
+  const Image quads = rendererBy(Backend::kEglQuads)->render(camera("iso"), options(0), statistics);
+  const auto card = renderer();
+  const Image before = card->render(camera("iso"), options(64 * kMiB), statistics);
+  EXPECT_GT(statistics.card_splats, 0u);
+  FailingBackend::faults.is_reset = true;
+  EXPECT_EQ(card->render(camera("iso"), options(64 * kMiB), statistics).rgba, quads.rgba);
+  EXPECT_EQ(statistics.card_splats, 0u);
+  EXPECT_NE(card->backendName().find("quads (the graphics card was reset while drawing)"), std::string::npos)
+      << card->backendName();
+  EXPECT_GE(compareImages(before, quads).psnr_db, 50);
+}
+
+TEST(Backends, GoOnWithQuadsAndThenByTheProcessor) {
+  std::unique_ptr<PaintingBackend> backend;
+  try {
+    backend = makeBackend(Backend::kEglQuads);
+  } catch (const Error& error) {
+    GTEST_SKIP() << error.what();
+  }
+  replaceFailed(backend, "no memory");
+  EXPECT_TRUE(backend->name().starts_with("CPU") && backend->name().ends_with(" (no memory)"))
+      << backend->name();
+}
+
+GLint told_kibibytes = 0;
+bool is_told = true;
+GLenum told_error = GL_NO_ERROR;
+
+TEST(CardMemory, IsTakenByWhatTheDriverTells) {
+  const GlFunctions gl([](const char* name) -> void* {
+    const PFNGLGETINTEGERVPROC integer = [](GLenum, GLint* value) {
+      if (is_told) *value = told_kibibytes;
+      told_error = is_told ? GL_NO_ERROR : GL_INVALID_ENUM;
+    };
+    const PFNGLGETERRORPROC error = [] { return std::exchange(told_error, GLenum{GL_NO_ERROR}); };
+    return std::string_view(name) == "glGetError" ? reinterpret_cast<void*>(error)
+                                                  : reinterpret_cast<void*>(integer);
+  });
+  told_kibibytes = 8 << 20;
+  EXPECT_EQ(defaultCardBytes(gl, 64 * 1024 * kMiB), 6 * 1024 * kMiB);
+  told_kibibytes = 0;  // the processor's memory is the card's
+  EXPECT_EQ(defaultCardBytes(gl, 64 * 1024 * kMiB), 768 * kMiB);
+  EXPECT_EQ(defaultCardBytes(gl, 4 * 1024 * kMiB), 512 * kMiB);
+  is_told = false;
+  EXPECT_EQ(defaultCardBytes(gl, 0), 768 * kMiB);
 }
 
 /// The pieces of `count` splats with this code.

@@ -282,6 +282,10 @@ void render(const RenderArguments& given) {
     writeReport();
     throw Interrupted(interrupted.signal(), howFar(report, numbers.size(), severalFrames(arguments)));
   }
+  if (player.renderer().backendName() != report.backend) {
+    report.backend = player.renderer().backendName();
+    printMessage("warning: OpenGL could not go on; drawn by {}", report.backend);
+  }
   if (!ranks.isFirst()) return;
   writeReport();
   printResult(report);

@@ -1,0 +1,15 @@
+// The exception of a painter that cannot go on, though another one may.
+#pragma once
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+
+/// OpenGL or its card has failed: it has no memory left, was reset, or refuses what is asked of it. Frames are drawn by the
+/// next way then (FramePipeline::fallBack()).
+class PainterFailure : public Error {
+ public:
+  using Error::Error;
+};
+
+}  // namespace curvisplat
