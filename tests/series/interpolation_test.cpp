@@ -308,6 +308,36 @@ TEST_F(StepPlayerTest, KeepsDecodedGeometry) {
   EXPECT_EQ(second.bricks_cached, first.bricks_read);
 }
 
+TEST_F(StepPlayerTest, KeepsGeometryOnTheCard) {
+  CacheReader reader(cache());
+  const Camera view = camera(reader);
+  FrameOptions stored = options(512 << 20);
+  stored.lod_pixels = 0;
+  stored.card_memory_bytes = uint64_t{64} << 20;
+  std::unique_ptr<StepPlayer> player;
+  try {
+    player = std::make_unique<StepPlayer>(reader, DrawnScalars(0, function()), Backend::kEgl);
+  } catch (const Error& error) {
+    GTEST_SKIP() << error.what();
+  }
+  if (player->renderer().backendName().find("compute shaders") == std::string::npos) GTEST_SKIP();
+  const auto sentAt = [&](uint64_t step) {
+    player->goTo({step});
+    FrameStatistics statistics;
+    const Image image = player->renderer().render(view, stored, statistics);
+    EXPECT_GT(statistics.card_splats, 0u);
+    FrameStatistics by_processor;
+    FrameRenderer alone(reader, 0, function(), Backend::kCpu);
+    EXPECT_GE(compareImages(image, alone.render(view, stored, by_processor)).psnr_db, 60) << step;
+    return statistics.card_sent_bytes;
+  };
+  const uint64_t first = sentAt(0), second = sentAt(1);
+  EXPECT_GT(second, 0u);
+  EXPECT_LT(2 * second, first);  // 5 of 17 numbers a splat, and less of pieces
+  EXPECT_EQ(sentAt(0), 0u);
+  EXPECT_EQ(sentAt(1), 0u);
+}
+
 TEST_F(StepPlayerTest, DecodesValuesThatOthersArePredictedFromOnce) {
   const CacheReader first(cache());
   const uint32_t bricks = static_cast<uint32_t>(first.bricks().size());
