@@ -10,6 +10,7 @@
 #include "render/frame/frame_workers.h"
 #include "render/image/too_little_memory.h"
 #include "render/mesh/curve_set.h"
+#include "render/surface/rasterizer.h"
 #include "render/surface/scene_layers.h"
 #include "render/surface/slice_sampler.h"
 #include "stream/base/compute_permits.h"
@@ -66,7 +67,8 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
                   [](const Curves& curves) { return curves.opacity < 1; });
   constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8,
                      kPointBytes = 28;
-  uint64_t bytes = kSampleTileBytes * (peels ? kMaxPeels : 1) * threadsOrCores(options.threads) +
+  const uint64_t tile_bytes = kSampleTileBytes + (options.scene->curves.empty() ? 0 : CapsuleQueue::kBytes);
+  uint64_t bytes = tile_bytes * (peels ? kMaxPeels : 1) * threadsOrCores(options.threads) +
                    options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +

@@ -47,7 +47,9 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
   x1_ = std::min(x0_ + kSampleTileWidth, triangles.view().size.width) - 1;
   y1_ = std::min(y0_ + kSampleTileHeight, triangles.view().size.height) - 1;
   before_ = before;
+  capsules_.clear();
   bool cleared = false;
+  size_t last = 0;  // surface
   std::array<uint32_t, kAtOnce> numbers;
   const bool any = bins.forTile(column, row, [&](size_t surface, std::span<const TriangleRun> seen) {
     if (!std::exchange(cleared, true)) {
@@ -57,20 +59,26 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
       std::fill(samples_.begin(), samples_.end(), nothing);
       depths_.clear();
     }
+    if (std::exchange(last, surface) != surface) drawTaken(triangles, throw_if_stopped);
     size_t taken = 0;
-    const auto drawTaken = [&] {
-      if (throw_if_stopped) throw_if_stopped();
+    const auto takeNumbers = [&] {
       const std::span<const uint32_t> of_surface = std::span(numbers).first(std::exchange(taken, 0));
-      triangles.isCurve(surface) ? drawCurve(triangles, surface, of_surface)
-                                 : drawSurface(triangles, surface, of_surface);
+      if (!triangles.isCurve(surface)) {
+        if (throw_if_stopped) throw_if_stopped();
+        drawSurface(triangles, surface, of_surface);
+        return;
+      }
+      takeCapsules(triangles, surface, of_surface);
+      if (capsules_.size() > CapsuleQueue::kMaxSize - kAtOnce) drawTaken(triangles, throw_if_stopped);
     };
     for (const TriangleRun& run : seen)
       for (uint32_t n = 0; n < run.count; ++n) {
         numbers[taken++] = run.first + n;
-        if (taken == kAtOnce) drawTaken();
+        if (taken == kAtOnce) takeNumbers();
       }
-    if (taken > 0) drawTaken();
+    if (taken > 0) takeNumbers();
   });
+  drawTaken(triangles, throw_if_stopped);
   // All of it may lie before what is asked for.
   return any && (!before || std::any_of(samples_.begin(), samples_.end(), [](const PixelSamples& pixel) {
            return std::any_of(pixel.numbers.begin(), pixel.numbers.end(),
@@ -103,31 +111,69 @@ void SampleTile::drawSurface(const SceneTriangles& triangles, size_t surface,
   }
 }
 
-void SampleTile::drawCurve(const SceneTriangles& triangles, size_t curve, std::span<const uint32_t> points) {
-  std::array<Capsule, kAtOnce> capsules;
-  std::array<uint32_t, kAtOnce> numbers;
-  std::array<NumberRange, kAtOnce> insides;
+std::span<const CapsuleQueue::Entry> CapsuleQueue::sorted() {
+  constexpr size_t kBins = 1024;
+  const auto valueOf = [](const Entry& entry) {
+    return std::min(entry.capsule.a.value, entry.capsule.b.value);
+  };
+  float least = INFINITY, most = -INFINITY;
+  for (const Entry& entry : entries_) {
+    least = std::min(least, valueOf(entry));
+    most = std::max(most, valueOf(entry));
+  }
+  const float per_value = most > least ? (kBins - 1) / (most - least) : 0;
+  const auto binOf = [&](const Entry& entry) {
+    return static_cast<size_t>(std::clamp((valueOf(entry) - least) * per_value, 0.0f, float{kBins - 1}));
+  };
+  std::array<uint32_t, kBins + 1> begins{};
+  for (const Entry& entry : entries_) ++begins[binOf(entry) + 1];
+  for (size_t bin = 1; bin < kBins; ++bin) begins[bin] += begins[bin - 1];
+  sorted_.resize(entries_.size());
+  for (const Entry& entry : entries_) sorted_[begins[binOf(entry)]++] = entry;
+  return sorted_;
+}
+
+void SampleTile::takeCapsules(const SceneTriangles& triangles, size_t curve,
+                              std::span<const uint32_t> points) {
   const std::vector<uint32_t>& lines = triangles.curvesOf(curve).set->begins;
   const uint32_t first = triangles.firstOf(curve);
   auto line_end = lines.begin();
-  size_t count = 0;
   for (const uint32_t point : points) {
     const uint32_t begin = triangles.beginOf(curve, point);
     if (begin == SceneTriangles::kNoCapsule) continue;
     const Capsule capsule = triangles.capsuleOf(curve, point);
     if (std::isnan(capsule.a.value + capsule.b.value)) continue;
-    capsules[count] = capsule;
-    numbers[count] = first + point;
+    NumberRange inside{};
     if (before_) {
       if (!(point < *line_end)) line_end = std::upper_bound(line_end, lines.end(), point);
       const uint32_t reach = kReach * (point - begin + 1), line = *(line_end - 1);
-      insides[count] = {first + (point - line > reach ? point - reach : line),
-                        first + std::min(point + reach, *line_end - 1)};
+      inside = {first + (point - line > reach ? point - reach : line),
+                first + std::min(point + reach, *line_end - 1)};
     }
-    ++count;
+    capsules_.add({capsule, first + point, inside});
   }
-  drawCapsules({std::span(capsules).first(count), numbers.data(), insides.data(), depths_},
-               triangles.lookOf(curve), box());
+}
+
+/// Draws the capsules that were taken, of the curve that has the first one.
+void SampleTile::drawTaken(const SceneTriangles& triangles, const std::function<void()>& throw_if_stopped) {
+  if (capsules_.size() == 0) return;
+  const std::span<const CapsuleQueue::Entry> entries = capsules_.sorted();
+  const size_t curve = triangles.placeOf(entries.front().number).surface;
+  std::array<Capsule, kAtOnce> capsules;
+  std::array<uint32_t, kAtOnce> numbers;
+  std::array<NumberRange, kAtOnce> insides;
+  for (size_t begin = 0; begin < entries.size(); begin += kAtOnce) {
+    const size_t count = std::min(kAtOnce, entries.size() - begin);
+    for (size_t n = 0; n < count; ++n) {
+      capsules[n] = entries[begin + n].capsule;
+      numbers[n] = entries[begin + n].number;
+      insides[n] = entries[begin + n].inside;
+    }
+    if (throw_if_stopped) throw_if_stopped();
+    drawCapsules({std::span(capsules).first(count), numbers.data(), insides.data(), depths_},
+                 triangles.lookOf(curve), box());
+  }
+  capsules_.clear();
 }
 
 /// Coordinates in 1/16 pixel.

@@ -39,6 +39,33 @@ struct TileDepths {
   }
 };
 
+/// Consecutive numbers, the last included.
+struct NumberRange {
+  uint32_t first, last;
+};
+
+/// Capsules of one curve in a tile, which are drawn from the nearest on, so that most of a dense bundle lies behind what is
+/// there already. Their order changes the time alone. It takes up to kBytes. One thread at a time.
+class CapsuleQueue {
+ public:
+  static constexpr size_t kMaxSize = 4096;
+  struct Entry {
+    Capsule capsule;
+    uint32_t number;
+    NumberRange inside;
+  };
+  static constexpr size_t kBytes = 2 * kMaxSize * sizeof(Entry);
+
+  size_t size() const { return entries_.size(); }
+  void clear() { entries_.clear(); }
+  void add(const Entry& entry) { entries_.push_back(entry); }
+  /// All entries, from the nearest on, to a thousandth of their range of depths. Valid until the queue changes.
+  std::span<const Entry> sorted();
+
+ private:
+  std::vector<Entry> entries_, sorted_;
+};
+
 /// The samples of one tile: 256 KiB, to be used for many. One thread at a time.
 class SampleTile {
  public:
@@ -62,7 +89,8 @@ class SampleTile {
  private:
   struct Setup;
   void drawSurface(const SceneTriangles& triangles, size_t surface, std::span<const uint32_t> numbers);
-  void drawCurve(const SceneTriangles& triangles, size_t curve, std::span<const uint32_t> points);
+  void takeCapsules(const SceneTriangles& triangles, size_t curve, std::span<const uint32_t> points);
+  void drawTaken(const SceneTriangles& triangles, const std::function<void()>& throw_if_stopped);
   SampleBox box();
   void drawTriangle(const std::array<ScreenVertex, 3>& corners, uint32_t number);
   void drawGuarded(const std::array<ScreenVertex, 3>& corners, uint32_t number);
@@ -72,6 +100,7 @@ class SampleTile {
   const SampleTile* before_ = nullptr;  // while it draws
   TileDepths depths_;
   std::vector<PixelSamples> samples_;  // [kSampleTileHeight][kSampleTileWidth]
+  CapsuleQueue capsules_;              // of one curve
 };
 
 /// The most pixels along a side of a small triangle: products of a small triangle's differences have fewer
@@ -89,11 +118,6 @@ struct SmallTriangles {
 /// Draws the small ones into the samples of a tile. Writes the others to `left` ([numbers]), and returns how
 /// many they are. Pure but for what it writes; any thread.
 size_t drawSmallTriangles(const SmallTriangles& work, const SampleBox& box, uint32_t* left);
-
-/// Consecutive numbers, the last included.
-struct NumberRange {
-  uint32_t first, last;
-};
 
 /// Capsules of one curve, those to draw.
 struct CapsuleWork {

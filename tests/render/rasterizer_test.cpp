@@ -279,6 +279,31 @@ TEST_P(Rasterizer, TheOrderOfCapsulesDoesNotMatter) {
     }
 }
 
+TEST(CapsuleQueueOrder, BeginsWithTheNearestAndKeepsAll) {
+  std::mt19937 random(5);
+  CapsuleQueue queue;
+  constexpr uint32_t kCount = 5000;
+  for (uint32_t n = 0; n < kCount; ++n) {
+    const auto value = [&] { return static_cast<float>(random()) / 4294967296.0f; };
+    queue.add({{{0, 0, value()}, {1, 1, value()}}, n, {n, n}});
+  }
+  std::vector<bool> seen(kCount, false);
+  float before = 0;
+  for (const CapsuleQueue::Entry& entry : queue.sorted()) {
+    const float nearest = std::min(entry.capsule.a.value, entry.capsule.b.value);
+    EXPECT_GE(nearest, before - 0.001f);
+    before = std::max(before, nearest);
+    EXPECT_FALSE(seen[entry.number]);
+    EXPECT_EQ(entry.inside.first, entry.number);
+    seen[entry.number] = true;
+  }
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), true), kCount);
+  // All at the same depth, as in a plane that faces the viewer.
+  queue.clear();
+  for (uint32_t n = 0; n < 3; ++n) queue.add({{{0, 0, 2}, {1, 1, 2}}, n, {}});
+  EXPECT_EQ(queue.sorted().size(), 3U);
+}
+
 TEST_P(Rasterizer, ATranslucentTubeIsOneLayer) {
   std::vector<glm::dvec3> arc;
   for (int n = 0; n <= 300; ++n)
