@@ -10,6 +10,7 @@
 #include "render/frame/frame_workers.h"
 #include "render/image/too_little_memory.h"
 #include "render/mesh/curve_set.h"
+#include "render/surface/map_image.h"
 #include "render/surface/rasterizer.h"
 #include "render/surface/scene_layers.h"
 #include "render/surface/slice_sampler.h"
@@ -72,7 +73,7 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
                    options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
-             kTriangleBytes * surface.mesh->triangles.size();
+             kTriangleBytes * surface.mesh->triangles.size() + (surface.map ? surface.map->image.bytes() : 0);
   for (const Curves& curves : options.scene->curves) {
     bytes += curves.set->bytes() + kPointBytes * curves.set->positions.size();
     if (curves.whole && curves.whole != curves.set) bytes += curves.whole->bytes();

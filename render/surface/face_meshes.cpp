@@ -289,8 +289,8 @@ SurfaceScene FaceMeshes::withMeshes(const std::shared_ptr<const SurfaceScene>& s
       kept_[n].surface = surface;
       kept_[n].chosen = std::move(chosen);
     }
-    drawn.surfaces.push_back(
-        {kept_[n].mesh, surface.colour, surface.scalar.has_value(), surface.colours, surface.opacity});
+    drawn.surfaces.push_back({kept_[n].mesh, surface.colour, surface.scalar.has_value(), surface.colours,
+                              surface.opacity, surface.map});
   }
   return drawn;
 }

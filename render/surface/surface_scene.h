@@ -31,6 +31,8 @@ struct SheetOpacity {
   bool opaque() const { return factor >= 1 && !by_function; }
 };
 
+struct PlacedMap;
+
 /// Lit, from both sides. In data coordinates.
 struct Surface {
   std::shared_ptr<const TriangleMesh> mesh;
@@ -39,6 +41,8 @@ struct Surface {
   bool by_scalar = false;
   std::shared_ptr<const ColourTable> colours = nullptr;  // in place of those of the picture's function
   SheetOpacity opacity = {};  // by_function: where `by_scalar`, or the mesh has opacity_scalars
+  // The image replaces `colour`; the picture's light alone lights it (render/surface/map_image.h).
+  std::shared_ptr<const PlacedMap> map = nullptr;
 };
 
 /// Faces of the grid from its cache, drawn as a Surface at a level of detail that depends on the view.
@@ -60,7 +64,8 @@ struct GridSurface {
   // in another file; none: `scalar` has the opacities as well.
   std::shared_ptr<const FacesReader> opacity_faces = nullptr;
   std::optional<size_t> opacity_scalar = std::nullopt;
-  std::string opacity_name = {};  // in the cache
+  std::string opacity_name = {};                   // in the cache
+  std::shared_ptr<const PlacedMap> map = nullptr;  // as Surface, where it has no scalar
 
   /// Takes what does not change the mesh: colours and opacities' factors.
   void takeLookOf(const GridSurface& other) {
@@ -68,6 +73,7 @@ struct GridSurface {
     colours = other.colours;
     function = other.function;
     opacity = other.opacity;
+    map = other.map;
   }
   /// Whether the same patches make the same mesh.
   bool hasMeshOf(const GridSurface& other) const {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render/mesh/curve_set.h"
+#include "render/surface/map_image.h"
 
 namespace curvisplat {
 
@@ -67,7 +68,7 @@ void SurfaceLight::light(LitPoints& points, size_t count) const {
 
 SurfaceShader::SurfaceShader(const SceneTriangles& triangles, const Tables& tables,
                              const std::optional<Light>& light)
-    : triangles_(triangles), tables_(tables), light_(light, triangles.view()) {
+    : triangles_(triangles), tables_(tables), light_(light, triangles.view()), has_light_(light.has_value()) {
   for (const Surface& surface : triangles.scene().surfaces) {
     has_scalars_ = has_scalars_ || (surface.by_scalar && !surface.mesh->scalars.empty());
     has_others_ = has_others_ || (surface.opacity.by_function && !surface.mesh->opacity_scalars.empty());
@@ -191,6 +192,7 @@ void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> poi
     point.scalar = isovalueOf(number);
     if (!std::isnan(point.scalar) && !std::isnan(scalar)) point.scalar = scalar;
     point.colour = std::isnan(scalar) ? surface.colour : colours.at(double{scalar});
+    if (surface.map && std::isnan(scalar)) shadeMap(spots[n], *surface.map, point);
     if (!surface.opacity.by_function) continue;
     const bool has_other = !surface.mesh->opacity_scalars.empty() && tables_.opacities;
     const float of_opacity = has_other ? mixed.other[n] : scalar;
@@ -252,6 +254,48 @@ void SurfaceShader::shadeCapsule(const Spot& spot, Point& point) const {
   const float scalar = begin + along * (values[end] - begin);
   if (!std::isnan(scalar))
     point.colour = (curves.colours ? *curves.colours : tables_.colours).at(double{scalar});
+}
+
+/// The point of a triangle that a ray meets, in data coordinates; within the triangle, whose plane may be seen edge-on.
+glm::dvec3 SurfaceShader::placeSeen(const Spot& spot) const {
+  const auto [number, triangle] = triangles_.placeOf(spot.number);
+  const TriangleMesh& mesh = *triangles_.scene().surfaces[number].mesh;
+  const ScreenView& view = triangles_.view();
+  std::array<glm::dvec3, 3> corners;  // stretched, from the eye
+  for (size_t c = 0; c < 3; ++c)
+    corners[c] =
+        view.scale * (mesh.origin + glm::dvec3(mesh.positions[mesh.triangles[triangle][c]])) - view.eye;
+  const double x = (double{spot.x} - 0.5 * view.size.width) / view.focal_px,
+               y = (double{spot.y} - 0.5 * view.size.height) / view.focal_px;
+  const glm::dvec3 aside = x * view.right + y * view.down;
+  const bool perspective = view.projection == Projection::kPerspective;
+  const glm::dvec3 way = perspective ? aside + view.forward : view.forward;
+  if (!perspective)
+    for (glm::dvec3& corner : corners) corner -= aside;
+  // The volumes of the tetrahedra that the ray makes with the edges.
+  double sum = 0, sign = 0;
+  std::array<double, 3> shares;
+  for (size_t c = 0; c < 3; ++c) {
+    shares[c] = glm::dot(way, glm::cross(corners[(c + 1) % 3], corners[(c + 2) % 3]));
+    sign += shares[c];
+  }
+  glm::dvec3 place(0.0);
+  for (size_t c = 0; c < 3; ++c) {
+    const double share = std::max(sign < 0 ? -shares[c] : shares[c], 0.0);
+    place += share * corners[c];
+    sum += share;
+  }
+  place = sum > 0 ? place / sum : (corners[0] + corners[1] + corners[2]) / 3.0;
+  if (!perspective) place += aside;
+  return (place + view.eye) / view.scale;
+}
+
+/// Gives a point the map's colour; without a light of the picture it is that of the image.
+void SurfaceShader::shadeMap(const Spot& spot, const PlacedMap& map, Point& point) const {
+  const ScreenView& view = triangles_.view();
+  const glm::dvec3 place = placeSeen(spot);
+  point.colour = map.at(place, pixelSide(view, view.viewFromData(place).z));
+  if (!has_light_) point.normal = glm::vec3(0.0f);
 }
 
 /// The value of an isosurface; NaN of another surface.

@@ -103,11 +103,14 @@ class SurfaceShader {
   float isovalueOf(size_t surface) const;
   void shadeBlock(std::span<const Spot> spots, std::span<Point> points) const;
   void shadeCapsule(const Spot& spot, Point& point) const;
+  glm::dvec3 placeSeen(const Spot& spot) const;
+  void shadeMap(const Spot& spot, const PlacedMap& map, Point& point) const;
   void smoothJoints(size_t curve, uint32_t end, CapsulePlace& place) const;
 
   const SceneTriangles& triangles_;
   const Tables tables_;
   const SurfaceLight light_;
+  const bool has_light_;
   bool has_scalars_ = false, has_others_ = false;
 };
 
