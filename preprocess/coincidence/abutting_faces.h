@@ -65,6 +65,8 @@ class AbuttingFaces {
   void match(const Progress& progress);
   /// Whether a face at its block's end abuts on another, after match(). Any thread.
   bool abuts(const CellFace& face) const { return abutting_[numberOf(face)]; }
+  /// Answers for a face by its number.
+  bool abuts(uint64_t face) const { return abutting_[face]; }
   /// Whether the side of a block that has the face abuts on itself there: a cut behind a body, or a body
   /// without thickness. After keepFolds() and match(). Any thread.
   bool folds(const CellFace& face) const { return folded_[numberOf(face)]; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/common.hpp>
 #include <limits>
 #include <vector>
@@ -122,47 +123,131 @@ class StripWriter {
 
 }  // namespace
 
-BlankFaces::BlankFaces(const FaceBox& box, uint64_t sort_bytes, const std::filesystem::path& temporary)
-    : box_(box), quads_(kRecordSize, sort_bytes, temporary) {}
+BlankFaces::BlankFaces(const GridDescription& grid, const FaceBox& box, uint64_t sort_bytes,
+                       const std::filesystem::path& temporary)
+    : box_(box),
+      quads_(kRecordSize, sort_bytes / 4, temporary),
+      end_quads_(kRecordSize + 1, sort_bytes / 4, temporary),
+      ends_(grid.blocks, grid.coordinate_bytes, sort_bytes / 4, temporary),
+      drawn_ends_(grid.blocks, grid.coordinate_bytes, sort_bytes / 4, temporary) {}
+
+/// A slab, and what its cells are.
+struct BlankFaces::Window {
+  const LoadedSlab& loaded;
+  const FaceBox& box;
+  std::array<uint64_t, 3> size;  // of the block, in nodes
+  bool of_cells;
+  WindowStrides strides{loaded.slab.window, size[0]};
+  std::array<size_t, 3> stride{1, strides.row, strides.plane};
+
+  bool isThere(size_t at) const {
+    return of_cells ? cellIsThere(loaded.nodes, at, strides.row, strides.plane)
+                    : cornerMarks(loaded.nodes.blank.data(), at, strides.row, strides.plane) == 0;
+  }
+  /// The quad at right angles to an axis with its first corner at a node of the window.
+  Quad quadAt(size_t at, size_t axis) const {
+    const auto [u, v] = kFaceAxes[axis];
+    const auto codeAt = [&](size_t node) {
+      const NodeArrays& nodes = loaded.nodes;
+      return Code{faceCode(box, nodes.x[node], 0), faceCode(box, nodes.y[node], 1),
+                  faceCode(box, nodes.z[node], 2)};
+    };
+    return {codeAt(at), codeAt(at + stride[u]), codeAt(at + stride[v]), codeAt(at + stride[u] + stride[v])};
+  }
+  uint64_t numberOf(const std::array<uint64_t, 3>& node, size_t axis) const {
+    const auto [u, v] = kFaceAxes[axis];
+    return uint64_t{axis} << 60 | ((node[axis] * size[v] + node[v]) * size[u] + node[u]);
+  }
+};
 
 void BlankFaces::add(const LoadedSlab& loaded, const GridBlock& block, bool of_cells) {
-  const Slab& slab = loaded.slab;
-  const NodeArrays& nodes = loaded.nodes;
-  const std::array<uint64_t, 3> size{block.ni, block.nj, block.nk};
-  if (std::any_of(size.begin(), size.end(), [](uint64_t n) { return n < 2; })) return;
-  if (std::all_of(nodes.blank.begin(), nodes.blank.end(), [](uint8_t mark) { return mark == 0; })) return;
-  const WindowStrides strides(slab.window, block.ni);
-  const std::array<size_t, 3> stride{1, strides.row, strides.plane};
-  const auto isThere = [&](size_t at) {
-    return of_cells ? cellIsThere(nodes, at, strides.row, strides.plane)
-                    : cornerMarks(nodes.blank.data(), at, strides.row, strides.plane) == 0;
-  };
-  const auto codeAt = [&](size_t at) {
-    return Code{faceCode(box_, nodes.x[at], 0), faceCode(box_, nodes.y[at], 1),
-                faceCode(box_, nodes.z[at], 2)};
-  };
-  parallelFor(slab.box.k0, std::min(slab.box.k1, size[2] - 1), [&](uint64_t k) {
+  const Window window{loaded, box_, {block.ni, block.nj, block.nk}, of_cells};
+  if (std::any_of(window.size.begin(), window.size.end(), [](uint64_t n) { return n < 2; })) return;
+  const std::vector<uint8_t>& marks = loaded.nodes.blank;
+  const bool any = std::any_of(marks.begin(), marks.end(), [](uint8_t mark) { return mark != 0; });
+  const NodeBox& box = loaded.slab.box;
+  parallelFor(box.k0, std::min(box.k1, window.size[2] - 1), [&](uint64_t k) {
     const TraceScope trace("find faces of blanked cells");
-    std::vector<double> found;
-    for (uint64_t j = slab.box.j0; j < std::min(slab.box.j1, size[1] - 1); ++j)
-      for (uint64_t i = slab.box.i0; i < std::min(slab.box.endOfRow(size[0]), size[0] - 1); ++i) {
-        const std::array<uint64_t, 3> node{i, j, k};
-        const size_t at = strides.at(i, j, k);
-        const bool is_there = isThere(at);
-        for (size_t axis = 0; axis < 3; ++axis) {
-          if (node[axis] == 0 || isThere(at - stride[axis]) == is_there) continue;
-          const auto [u, v] = kFaceAxes[axis];
-          const uint64_t number = (node[axis] * size[v] + node[v]) * size[u] + node[u];
-          const Quad quad{codeAt(at), codeAt(at + stride[u]), codeAt(at + stride[v]),
-                          codeAt(at + stride[u] + stride[v])};
-          appendRecord(slab.block, uint64_t{axis} << 60 | number, quad, found);
-        }
+    if (any) addInside(window, k);
+    addEnds(window, k);
+  });
+}
+
+/// Adds the quads between two cells of the block.
+void BlankFaces::addInside(const Window& window, uint64_t k) {
+  const Slab& slab = window.loaded.slab;
+  const std::array<uint64_t, 3>& size = window.size;
+  std::vector<double> found;
+  for (uint64_t j = slab.box.j0; j < std::min(slab.box.j1, size[1] - 1); ++j)
+    for (uint64_t i = slab.box.i0; i < std::min(slab.box.endOfRow(size[0]), size[0] - 1); ++i) {
+      const std::array<uint64_t, 3> node{i, j, k};
+      const size_t at = window.strides.at(i, j, k);
+      const bool is_there = window.isThere(at);
+      for (size_t axis = 0; axis < 3; ++axis) {
+        if (node[axis] == 0 || window.isThere(at - window.stride[axis]) == is_there) continue;
+        appendRecord(slab.block, window.numberOf(node, axis), window.quadAt(at, axis), found);
       }
+    }
+  quads_.add(found);
+}
+
+/// Adds the quads at the ends of the block, those of blanked cells, too, wherever they lie.
+void BlankFaces::addEnds(const Window& window, uint64_t k) {
+  const Slab& slab = window.loaded.slab;
+  const NodeArrays& nodes = window.loaded.nodes;
+  std::vector<AbuttingFaces::Centre> ends, drawn;
+  std::vector<double> quads;
+  const auto addCell = [&](const std::array<uint64_t, 3>& cell) {
+    const size_t at = window.strides.at(cell[0], cell[1], cell[2]);
+    const bool is_there = window.isThere(at);
+    const std::array<glm::dvec3, 8> corners = cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at,
+                                                        window.strides.row, window.strides.plane);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const bool upper : {false, true}) {
+        const CellFace face{slab.block, cell, axis, upper};
+        if (!ends_.isAtEnd(face)) continue;
+        const AbuttingFaces::Centre centre = ends_.centreOf(face, corners);
+        const double sum = centre.at.x + centre.at.y + centre.at.z;
+        if (!std::isfinite(sum) || (centre.collapsed && !is_there)) continue;
+        ends.push_back(centre);
+        if (!is_there) continue;
+        drawn.push_back(centre);
+        std::array<uint64_t, 3> node = cell;
+        const auto a = static_cast<size_t>(axis);
+        node[a] += upper;
+        appendRecord(slab.block, window.numberOf(node, a),
+                     window.quadAt(at + (upper ? window.stride[a] : 0), a), quads);
+        quads.push_back(static_cast<double>(centre.face));
+      }
+  };
+  const std::array<uint64_t, 3>& size = window.size;
+  for (uint64_t j = slab.box.j0; j < std::min(slab.box.j1, size[1] - 1); ++j) {
+    const bool row_at_end = j == 0 || j + 2 == size[1] || k == 0 || k + 2 == size[2];
+    for (uint64_t i = slab.box.i0; i < std::min(slab.box.endOfRow(size[0]), size[0] - 1); ++i)
+      if (row_at_end || i == 0 || i + 2 == size[0]) addCell({i, j, k});
+  }
+  end_quads_.add(quads);
+  const MutexLock lock(adding_);
+  ends_.add(ends);
+  drawn_ends_.add(drawn);
+}
+
+/// Adds the quads of drawn cells that have a blanked cell of another block, or of the other end of theirs, beside them.
+void BlankFaces::addCoastsBetweenBlocks(const Progress& progress) {
+  ends_.match(progress);
+  drawn_ends_.match(progress);
+  std::vector<double> found;
+  end_quads_.drain([&](const double* record) {
+    progress.throwIfStopped();
+    const auto face = static_cast<uint64_t>(record[kRecordSize]);
+    if (!ends_.abuts(face) || drawn_ends_.abuts(face)) return;
+    found.assign(record, record + kRecordSize);
     quads_.add(found);
   });
 }
 
 std::optional<FileInfo> BlankFaces::write(const std::filesystem::path& output, const Progress& progress) {
+  addCoastsBetweenBlocks(progress);
   StripWriter writer(output, box_);
   double block = -1;
   uint64_t last = 0;

@@ -76,7 +76,7 @@ class FacesPass {
         progress_(progress),
         abutting_(grid_.blocks, grid_.coordinate_bytes, sortBytes(), job.temporary),
         spool_(reader, facesOf(grid_, job.planes), FaceBox::of(job.lower, job.upper), job.temporary) {
-    if (!job.blanks.empty()) blanks_.emplace(spool_.box(), sortBytes(), job.temporary);
+    if (!job.blanks.empty()) blanks_.emplace(grid_, spool_.box(), sortBytes(), job.temporary);
   }
 
   FacesFiles write(const SlabBuffers& slabs) {
@@ -109,7 +109,7 @@ class FacesPass {
 
   /// Memory for AbuttingFaces, and as much for BlankFaces.
   uint64_t sortBytes() const {
-    const uint64_t needs = 2 * AbuttingFaces::needsOf(grid_.blocks).memory_bytes;
+    const uint64_t needs = (job_.blanks.empty() ? 2 : 4) * AbuttingFaces::needsOf(grid_.blocks).memory_bytes;
     if (2 * needs > job_.sort_bytes)
       throw Error("--memory: the faces of this grid's blocks take {} MiB; give more, or add --no-surfaces",
                   (2 * needs >> 20) + 1);

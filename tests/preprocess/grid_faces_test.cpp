@@ -2,6 +2,7 @@
 // that the bytes depend on the grid alone.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -183,6 +184,33 @@ TEST_F(GridFacesTest, FacesOfBlankedCellsAreThoseBetweenDrawnAndBlankedOnes) {
   EXPECT_EQ(readTextFile(folder_ / "a.splats/faces.blanks.bin"), bytes);
   blank_faces_ = false;
   EXPECT_FALSE(blanksOf(1 << 30, 2));
+}
+
+TEST_F(GridFacesTest, FacesOfBlankedCellsAreFoundWhereBlocksMeet) {
+  // The grid above in two blocks, the second from its end on. The island's coast lies where they meet, and the floor's steps.
+  static constexpr uint64_t kCut = 12, kNodes = 90;
+  const auto blanksOf = [&](uint64_t memory, unsigned threads) {
+    memory_ = memory;
+    threads_ = threads;
+    convertAndOpen(FunctionGridSource({gridBlock(kCut + 1, 80, 20), gridBlock(kNodes - kCut, 80, 20)}, 2,
+                                      [](const GridNode& node) {
+                                        GridNode whole = node;
+                                        if (node.block == 1) whole.i = kNodes - 1 - node.i;
+                                        NodeValues values = straight(whole);
+                                        values.blank = isBlanked(whole.i, whole.j, whole.k);
+                                        return values;
+                                      }));
+    return FacesReader::open(folder_ / "a.splats", manifest_, kBlanksFileName);
+  };
+  const auto blanks = blanksOf(1 << 30, 2);
+  ASSERT_TRUE(blanks);
+  const QuadSums expected = expectedBlankQuads({kNodes, 80, 20});
+  EXPECT_TRUE(
+      std::any_of(expected.begin(), expected.end(), [](const auto& sum) { return sum[0] == 4 * kCut; }));
+  EXPECT_EQ(blankQuadsOf(*blanks), expected);
+  const std::string bytes = readTextFile(folder_ / "a.splats/faces.blanks.bin");
+  ASSERT_TRUE(blanksOf(uint64_t{200} << 20, 1));
+  EXPECT_EQ(readTextFile(folder_ / "a.splats/faces.blanks.bin"), bytes);
 }
 
 TEST_F(GridFacesTest, AGridWithoutBlankedNodesHasNoFacesOfThem) {
