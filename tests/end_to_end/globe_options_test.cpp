@@ -2,11 +2,14 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <string>
+#include <tuple>
 
 #include "render/image/image.h"
+#include "render/image/image_file.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/series.h"
 #include "stream/model/globe.h"
@@ -223,6 +226,78 @@ TEST_F(GlobeOptions, TheAxesGridHasLongitudesLatitudesAndDepths) {
       EXPECT_EQ(inked, expected) << cache << ' ' << place;
     }
   }
+}
+
+/// A map whose squares of ten degrees have colours of their own.
+glm::vec3 colourOfSquare(int column, int row) {
+  return {static_cast<float>(7 * column) / 255, static_cast<float>(14 * row) / 255, 0.4f};
+}
+
+std::string mapOfSquares(const std::string& file) {
+  Image map({360, 180});
+  for (int y = 0; y < 180; ++y)
+    for (int x = 0; x < 360; ++x) {
+      const glm::vec3 colour = colourOfSquare(x / 10, y / 10);
+      for (int c = 0; c < 3; ++c) map.pixel(x, y)[c] = colour[c];
+      map.pixel(x, y)[3] = 1;
+    }
+  writeImage(map, file);
+  return file;
+}
+
+TEST_F(GlobeOptions, AnImageOfTheEarthLiesWhereItsPlacesAre) {
+  const std::string map = mapOfSquares(file("map.png"));
+  const auto middle = [&](const std::string& cache, const std::string& place, const Words& more = {}) {
+    const Image drawn = pictureOf(
+        file(cache + ".splats"), file("a.pfm"),
+        Words{"--volume", "off", "--look-at=" + place, "--from-height", "900", "--map", map} + more, "61x41");
+    return glm::vec3(drawn.pixel(30, 20)[0], drawn.pixel(30, 20)[1], drawn.pixel(30, 20)[2]);
+  };
+  // Longitude and latitude of the middles of squares, whose columns count from 180 degrees west, rows from 90 north.
+  for (const std::string cache : {"sea", "flat"})
+    for (const auto& [place, column, row] :
+         {std::tuple("5,45", 18, 4), {"-125,-35", 5, 12}, {"95,75", 27, 1}}) {
+      const glm::vec3 found = middle(cache, place), expected = colourOfSquare(column, row);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], 0.5 / 255) << cache << ' ' << place;
+    }
+  // A light of the picture lights it, too; its own height is the data's lowest.
+  EXPECT_NE(middle("sea", "5,45", {"--light", "0.2,0.2,0"}), middle("sea", "5,45"));
+  const Image lowest = picture({"--map", map});
+  expectSame(picture({"--map", map, "--map-height=-4"}), lowest);
+  EXPECT_LT(compareImages(picture({"--map", map, "--map-height", "20"}), lowest).psnr_db, kSame);
+}
+
+TEST_F(GlobeOptions, TheEarthHidesWhatIsBehindIt) {
+  const auto seen = [](const Words& more) {
+    return pictureOf(file("sea.splats"), file("a.pfm"),
+                     Words{"--volume", "off", "--position", "30000,0,0", "--focal-point", "0,0,0",
+                           "--view-up", "0,0,1", "--view-angle", "35"} +
+                         more,
+                     "120x120");
+  };
+  const Words behind{"--lines", csv("behind.csv", "lon,lat\n150,0\n170,10\n-160,20\n")};
+  const Words before{"--lines", csv("before.csv", "lon,lat\n-30,0\n10,10\n")};
+  const Image earth = seen({"--map", "#204060"});
+  const Image through = seen(behind);
+  EXPECT_GT(std::count_if(through.rgba.begin(), through.rgba.end(),
+                          [](float value) { return value > 0.3f && value < 0.99f; }),
+            50);
+  EXPECT_EQ(seen(Words{"--map", "#204060"} + behind).rgba, earth.rgba);
+  EXPECT_NE(seen(Words{"--map", "#204060"} + before).rgba, earth.rgba);
+  const auto refused = [](const std::string& cache, const Words& more, int status, const std::string& why) {
+    expectRefused(Words{"render", file(cache + ".splats"), "-o", file("a.png")} + more, status, {why});
+  };
+  writeImage(Image({30, 30}), file("square.png"));
+  refused("sea", {"--map", file("square.png")}, 1,
+          "square.png: has 30 x 30 pixels; a map of the whole Earth (equirectangular, ");
+  refused("sea", {"--map", file("sea.nc")}, 1, "sea.nc: not a PNG, ");
+  refused("sea", {"--map", file("none.png")}, 1, "none.png");
+  refused("sea", {"--map", "#12"}, 2, "--map");
+  refused("sea", {"--map-height", "2"}, 2, "--map-height 2 needs a map: --map FILE");
+  refused("sea", {"--map", "#123456", "--map-height=-1e6"}, 2, "lies below the middle of the Earth");
+  run({"generate", "half-annulus", "--size", "8x8x4", "-o", file("tube")});
+  run({"convert", file("tube.xyz"), file("tube.fun"), "-o", file("tube.splats")});
+  refused("tube", {"--map", "#123456"}, 1, "the cache does not say where its grid has them; --globe ");
 }
 
 TEST_F(GlobeOptions, HeightsAreStretchedAtDrawing) {

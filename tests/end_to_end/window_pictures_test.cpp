@@ -66,6 +66,26 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   expectDraws(command, twice);
 }
 
+/// Lines and the Earth are in no list of the window.
+TEST_F(WindowPictures, ShowTheLinesAndTheEarthOfTheCommandLine) {
+  writeFileAtomically("lines.csv", std::string("x,y,z\n-3,-1,0\n3,-1,0\n"));
+  open({"--lines", "lines.csv", "--lines-colour", "#00ff00", "--map", "#ff0000", "--map-height", "0",
+        "--globe", "0.5"});
+  const Image saved = saveAndCopy();
+  int green = 0, red = 0;
+  for (size_t n = 0; n < saved.rgba.size(); n += 4) {
+    const float *const rgb = &saved.rgba[n], least = 0.3f;
+    red += rgb[0] > least && rgb[0] > 3 * rgb[1] && rgb[0] > 3 * rgb[2];
+    green += rgb[1] > least && rgb[1] > 3 * rgb[0] && rgb[1] > 3 * rgb[2];
+  }
+  EXPECT_GT(red, 20);
+  EXPECT_GT(green, 20);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--lines"), "lines.csv");
+  expectDraws(commands[0], saved);
+}
+
 /// The window's memory is too little for them: they take more, where it is free.
 TEST_F(WindowPictures, LargeOnesTakeTheMemoryThatTheyNeed) {
   open({"--memory", "160M", "--iso", "0.5"});

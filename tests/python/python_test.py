@@ -95,9 +95,10 @@ class Pictures(PythonTest):
                              "--lines", lines, "--points", lines, "--lines-by", "speed", "--line-width", 0.1, "--point-size", "9px",
                              "--lines-opacity", 0.5, "--title", "{scalar} {step}", "--label", "t = {time:.1f}")
             lines.write_text("lon,lat,time\n0,10,0\n60,20,3\n")
-            self.expect_same(cache.render(size=size, lines=lines, lines_time=2.5, globe=(5, 2), look_at=(10, 20.5), from_height=8, axes_grid=True),
+            self.expect_same(cache.render(size=size, lines=lines, lines_time=2.5, globe=(5, 2), look_at=(10, 20.5), from_height=8, axes_grid=True,
+                                          map="#204060", map_height=-0.5),
                              "--lines", lines, "--lines-time", 2.5, "--globe", "5,2", "--look-at", "10,20.5", "--from-height", 8,
-                             "--axes-grid")
+                             "--axes-grid", "--map", "#204060", "--map-height=-0.5")
             self.expect_same(cache.render(size=size, camera=curvisplat.Camera((20, -9, 8)), zoom=2), "--position", "20,-9,8",
                              "--focal-point", "0,0,0", "--zoom", 2)
             self.expect_same(
@@ -267,6 +268,10 @@ class CamerasAndFunctions(PythonTest):
                 np.testing.assert_array_equal(np.asarray(picture)[..., :3], read_pfm(path), str(number))
             around = curvisplat.orbit(cameras[0], frames)
             self.assertEqual(around, cameras)
+            high = cache.camera("+x", size=(80, 60), vertical_scale=3)
+            self.assertNotEqual(high, cache.camera("+x", size=(80, 60)))
+            picture = cache.render(size=(80, 60), camera=high, vertical_scale=3)
+            np.testing.assert_array_equal(picture, cache.render(size=(80, 60), view="+x", vertical_scale=3))
             with self.assertRaisesRegex(curvisplat.UsageError, "expected from 1"):
                 cache.orbit(frames=0)
             with self.assertRaisesRegex(curvisplat.UsageError, "expected one or more"):

@@ -67,6 +67,7 @@ std::vector<std::filesystem::path> inputsOf(const RenderArguments& arguments) {
   const CurveArguments& curves = arguments.surfaces.curves;
   inputs.insert(inputs.end(), curves.lines.begin(), curves.lines.end());
   inputs.insert(inputs.end(), curves.points.begin(), curves.points.end());
+  if (arguments.surfaces.map.isImage()) inputs.emplace_back(*arguments.surfaces.map.map);
   std::copy_if(arguments.surfaces.surfaces.begin(), arguments.surfaces.surfaces.end(),
                std::back_inserter(inputs), isSurfaceFile);
   return inputs;

@@ -49,6 +49,30 @@ struct ViewArguments {
   StepArguments steps;
 };
 
+/// The options of lines, points and the Earth, as `render` takes them.
+std::vector<std::pair<std::string, std::string>> optionsOfGiven(const SurfaceArguments& arguments) {
+  std::vector<std::pair<std::string, std::string>> options;
+  const auto addAll = [&](const char* name, const std::vector<std::string>& values) {
+    for (const std::string& value : values) options.emplace_back(name, value);
+  };
+  const auto add = [&](const char* name, const std::optional<std::string>& value) {
+    if (value) options.emplace_back(name, *value);
+  };
+  const CurveArguments& curves = arguments.curves;
+  addAll("--lines", curves.lines);
+  addAll("--points", curves.points);
+  addAll("--lines-colour", curves.colours);
+  if (!curves.lines.empty()) add("--line-width", curves.line_width);
+  if (!curves.points.empty()) add("--point-size", curves.point_size);
+  if (curves.given()) add("--lines-opacity", curves.opacity);
+  if (!curves.by.empty()) add("--lines-by", curves.by);
+  add("--lines-time", curves.time);
+  add("--map", arguments.map.map);
+  add("--map-height", arguments.map.height);
+  add("--globe", arguments.globe);
+  return options;
+}
+
 /// The surfaces and slices of the command line.
 void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerOptions& options) {
   // The scalar changes in the window: faces that are coloured by another one have colours of their own.
@@ -59,6 +83,10 @@ void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerO
     else
       options.face_names.emplace_back(surface);
   options.faces_by = arguments.surfaces.surface_by;
+  if (!arguments.surfaces.curves.given() && !arguments.surfaces.map.map) return;
+  GivenSheets given{options.scene->curves, std::nullopt, kBlanks, optionsOfGiven(arguments.surfaces)};
+  if (arguments.surfaces.map.map) given.earth = options.scene->surfaces.back();
+  options.given = std::make_shared<GivenSheets>(std::move(given));
 }
 
 FaceServices faceServices() {

@@ -181,6 +181,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->capture_default_str()
       ->group(group);
   addCurveOptions(command, arguments.curves, group);
+  addMapOptions(command, arguments.map, group);
   addGlobeOption(command, arguments.globe, group);
 }
 
@@ -206,8 +207,10 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
   if (!of_isosurfaces.opaque() && arguments.isovalues.empty())
     throw UsageError("--iso-opacity needs an isosurface: --iso VALUE");
   checkCurveArguments(arguments.curves);
+  checkMapArguments(arguments.map);
   if (arguments.volume == "off" && arguments.surfaces.empty() && arguments.slices.empty() &&
-      arguments.isovalues.empty() && !arguments.curves.given() && !arguments.film_has_slices)
+      arguments.isovalues.empty() && !arguments.curves.given() && !arguments.map.map &&
+      !arguments.film_has_slices)
     throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface, an --iso or --lines");
 }
 
@@ -262,6 +265,8 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   if (!arguments.given()) return nullptr;
   auto scene = std::make_shared<SurfaceScene>();
   const auto faces = hasFaces(arguments) ? facesWith(arguments.surface_by, cache) : nullptr;
+  const std::optional<Globe> globe = globeOf(arguments.globe, cache.manifest());
+  const std::optional<Surface> earth = mapOf(arguments.map, cache, globe);
   for (size_t n = 0; n < arguments.surfaces.size(); ++n) {
     const glm::vec3 colour =
         arguments.colours.empty()
@@ -279,6 +284,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
     surface.colour = colour;
     surface.opacity = surfaceOpacity(arguments, n);
     if (arguments.surfaces[n] == kBlanks) {
+      if (earth && arguments.colours.empty()) surface.map = earth->map;
       if (surface.opacity.by_function)
         throw UsageError("--surface-opacity: {} has no values for a function; give a number", kBlanks);
       continue;
@@ -288,6 +294,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
     if (surface.opacity.by_function && scalars.opacity_by && scalars.areTwo())
       takeOpacities(surface, cache.manifest().variables[*scalars.opacities].name, cache);
   }
+  if (earth) scene->surfaces.push_back(*earth);
   scene->slices = parseSlices(arguments.slices);
   const SheetOpacity of_slices = parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
   scene->slice_opacity = of_slices.factor;
@@ -296,7 +303,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   scene->iso_opacity = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   scene->iso_of_colours = scalars.iso_of_colours;
   scene->volume = arguments.volume == "on";
-  scene->curves = curvesOf(arguments.curves, cache, globeOf(arguments.globe, cache.manifest()),
+  scene->curves = curvesOf(arguments.curves, cache, globe,
                            scalars.colours ? cache.manifest().variables[*scalars.colours].name : "");
   requireIsovalues(*scene, cache, scalars);
   return scene;

@@ -24,6 +24,7 @@
 #include "stream/cache/manifest.h"
 #include "tools/options/curve_arguments.h"
 #include "tools/options/frame_sequence.h"
+#include "tools/options/map_arguments.h"
 #include "tools/options/picture_texts.h"
 
 namespace curvisplat {
@@ -37,16 +38,17 @@ struct SurfaceArguments {
   std::vector<std::string> isovalues;
   std::string iso_opacity = "1";
   CurveArguments curves;
+  MapArguments map;
   bool film_has_slices = false;      // --path
   std::optional<std::string> globe;  // on which the cache's grid lies (globe_arguments.h)
 
   bool given() const {
-    return !surfaces.empty() || !slices.empty() || !isovalues.empty() || curves.given() || volume != "on" ||
-           film_has_slices;
+    return !surfaces.empty() || !slices.empty() || !isovalues.empty() || curves.given() || map.map ||
+           volume != "on" || film_has_slices;
   }
 };
 
-/// Adds --surface, --surface-colour, --surface-by, --slice, --slice-opacity, --volume and those of curves under the
+/// Adds --surface, --surface-colour, --surface-by, --slice, --slice-opacity, --volume and those of curves and maps under the
 /// heading `group`.
 void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std::string& group);
 

@@ -27,6 +27,7 @@
 #include "stream/cache/series.h"
 #include "stream/model/refinement.h"
 #include "tools/options/convert_arguments.h"
+#include "tools/options/globe_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/start_checks.h"
 #include "tools/python/array_source.h"
@@ -125,7 +126,10 @@ py::list camerasOf(const OpenCache& cache, const Options& camera, const std::str
   if (frames == 0 || frames > kMaxFrames)
     throw UsageError("{} frames: expected from 1 to {}", frames, kMaxFrames);
   const Manifest& manifest = cache.reader().manifest();
-  const glm::dvec3 factors = parsePoint("scale", scale);
+  const auto vertical = camera.find("vertical_scale");
+  const glm::dvec3 factors = verticallyScaled(
+      parsePoint("scale", scale), vertical == camera.end() ? std::nullopt : std::optional(vertical->second),
+      manifest.globe);
   const CameraMotion motion = chooseCameraMotion(
       arguments, {manifest.lower * factors, manifest.upper * factors}, parseImageSize("size", size));
   py::list out;

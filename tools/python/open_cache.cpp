@@ -97,6 +97,8 @@ SurfaceArguments surfaceArguments(const Options& frame, const py::dict& others) 
   curves.opacity = of<std::string>(others, "lines_opacity");
   curves.time = given(frame, "lines_time");
   arguments.globe = given(frame, "globe");
+  arguments.map.map = given(frame, "map");
+  arguments.map.height = given(frame, "map_height");
   return arguments;
 }
 

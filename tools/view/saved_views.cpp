@@ -328,6 +328,8 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
     words.add("--ambient-occlusion", number(state.ambient_occlusion));
   if (!state.gradient_opacity.empty()) words.add("--gradient-opacity", textOf(state.gradient_opacity));
   addSurfaces(state, !of_film, words);
+  if (state.given)
+    for (const auto& [option, value] : state.given->options) words.add(option, value);
   if (!state.dark) words.add("--background", "white");
   if (state.annotations.scalar_bar) words.add("--scalar-bar");
   if (state.annotations.axes) words.add("--axes");

@@ -271,7 +271,7 @@ bool ViewState::hasSheets() const {
   const bool has_isosurfaces = std::ranges::any_of(isosurfaces, [this](const Isosurface& one) {
     return one.visible && (!opacity_by || one.scalar == variable || one.scalar == opacity_by->variable);
   });
-  return has_isosurfaces || has_visible(surfaces) || has_visible(faces) || has_visible(slices);
+  return given || has_isosurfaces || has_visible(surfaces) || has_visible(faces) || has_visible(slices);
 }
 
 SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
@@ -350,6 +350,11 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
       surface.opacity = opacityOf(named);
       surface.function = of_faces;
       surface.colours = colours;
+      if (given && given->earth && named.name == given->faces_with_map) surface.map = given->earth->map;
+    }
+    if (given) {
+      if (given->earth) scene->surfaces.push_back(*given->earth);
+      scene->curves = given->curves;
     }
     scene->slices = visiblePlanes(slices);
     scene->slice_opacity = slice_opacity.factor;

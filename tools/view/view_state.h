@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render/annotate/annotations.h"
@@ -74,6 +75,14 @@ struct OpacityScalar {
   EditedFunction function;
 };
 
+/// Has what the command line shows beside the lists of the window, which neither change nor save it.
+struct GivenSheets {
+  std::vector<Curves> curves;
+  std::optional<Surface> earth;
+  std::string faces_with_map;                                // NamedFaces that show the Earth's image
+  std::vector<std::pair<std::string, std::string>> options;  // of `render`, which show the same
+};
+
 struct ViewState {
   static constexpr double kLightStrength = 0.7;
 
@@ -103,6 +112,7 @@ struct ViewState {
   Annotations annotations{.scalar_bar = true, .axes = true};
   std::optional<OpacityScalar> opacity_by = std::nullopt;
   std::vector<Marker> markers = {};
+  std::shared_ptr<const GivenSheets> given = nullptr;
 
   glm::vec4 background() const { return dark ? kDefaultBackground : glm::vec4(1); }
   /// Suits all functions to the background (EditedFunction::suitBackground()).

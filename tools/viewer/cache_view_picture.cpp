@@ -383,6 +383,7 @@ void CacheView::loadView(const std::string& name) {
     const fs::path file = savedViewOf(whole(), name);
     ViewState state = viewStateFromJson(readTextFile(file), file, manifest());
     loadSurfaces(state);
+    state.given = state_.given;
     restore(&state);
   } catch (const Error& error) {
     reports_.report(error);

@@ -17,7 +17,8 @@ namespace fs = std::filesystem;
 void takeScene(const ViewerOptions& options, const CacheReader& cache, ViewState& state) {
   const SurfaceScene& scene = *options.scene;
   state.surfaces.clear();
-  for (size_t n = 0; n < scene.surfaces.size(); ++n)
+  state.given = options.given;
+  for (size_t n = 0; n < options.surface_files.size(); ++n)
     state.surfaces.push_back({fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour,
                               scene.surfaces[n].mesh, scene.surfaces[n].opacity.factor});
   state.faces.clear();

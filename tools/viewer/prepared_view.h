@@ -44,6 +44,7 @@ struct ViewerOptions {
   std::vector<std::filesystem::path> surface_files;  // of the scene's surfaces
   std::vector<std::string> face_names;               // of its grid surfaces
   std::string faces_by;                              // --surface-by
+  std::shared_ptr<const GivenSheets> given;          // of the scene, what lists do not have
   FaceServices faces;
   std::optional<uint64_t> memory_bytes;
   ConversionServices conversion;

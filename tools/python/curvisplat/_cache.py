@@ -321,16 +321,18 @@ class Cache:
 
     @_arguments.in_one_line
     def camera(self, view: str = "iso", *, size: Tuple[int, int] = (600, 600), scale: Vector = (1, 1, 1),
-               view_angle: Optional[float] = None) -> Camera:
-        """A camera that has all of the data in a picture of this size: iso, +x, -x, +y, -y, +z or -z; with view_angle (degrees) in
-        perspective."""
-        return self.orbit(view, frames=1, degrees=0, size=size, scale=scale, view_angle=view_angle)[0]
+               vertical_scale: Optional[float] = None, view_angle: Optional[float] = None) -> Camera:
+        """A camera that has all of the data in a picture of this size, which render() draws with this scale and vertical_scale: iso,
+        +x, -x, +y, -y, +z or -z; with view_angle (degrees) in perspective."""
+        return self.orbit(view, frames=1, degrees=0, size=size, scale=scale, vertical_scale=vertical_scale,
+                          view_angle=view_angle)[0]
 
     @_arguments.in_one_line
     def orbit(self, view: str = "iso", *, frames: int = 90, degrees: float = 360, size: Tuple[int, int] = (600, 600),
-              scale: Vector = (1, 1, 1), view_angle: Optional[float] = None) -> Sequence[Camera]:
+              scale: Vector = (1, 1, 1), vertical_scale: Optional[float] = None,
+              view_angle: Optional[float] = None) -> Sequence[Camera]:
         """The cameras of `curvisplat render --orbit`, one a frame, which all have all of the data in the picture."""
-        options = _given(view=view, view_angle=view_angle, orbit=degrees)
+        options = _given(view=view, view_angle=view_angle, orbit=degrees, vertical_scale=vertical_scale)
         cameras = self._core.cameras(options, _arguments.picture_size(size), _numbers(scale),
                                      _arguments.whole("frames", frames))
         return [Camera(position, focal_point, view_up, None if view_angle else half, view_angle)
@@ -361,6 +363,7 @@ class Cache:
                label: Optional[str] = None, text_size: Optional[float] = None, lines: Union[str, Sequence[str]] = (), points: Union[str, Sequence[str]] = (),
                lines_by: str = "", lines_colour: Union[str, Sequence[str]] = (), line_width: Union[str, float] = "3px",
                point_size: Union[str, float] = "6px", lines_opacity: float = 1, lines_time: Union[str, float, None] = None,
+               map: Union[str, os.PathLike, None] = None, map_height: Optional[float] = None,
                globe: Optional[Sequence[float]] = None, look_at: Optional[Tuple[float, float]] = None, from_height: Optional[float] = None,
                channels: Union[str, Sequence[str]] = (), lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M",
@@ -403,6 +406,9 @@ class Cache:
         lines_time: of lines with times "past", "all", or how long before the time of the picture they begin. globe: (radius,
         vertical scale) of the sphere of a cache that does not have them.
 
+        map: the Earth below the data, an image of all of it or a colour "#rrggbb"; map_height: where, in kilometres (default: the
+        data's lowest, at most 0).
+
         look_at: (longitude, latitude), from_height: kilometres; a camera above that place.
 
         isovalues: of the scalar, or of iso_by. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
@@ -440,6 +446,7 @@ class Cache:
                        max_splats=None if max_splats is None else str(max_splats),
                        channels=",".join(_arguments.several(channels)) or "none",
                        lines_time=None if lines_time is None else _text(lines_time), globe=globe,
+                       map=None if map is None else os.fspath(map), map_height=map_height,
                        axes_titles=None if axes_titles is None else ",".join(axes_titles), title=title, label=label,
                        text_size=None if text_size is None else _text(text_size))
         others = {"clip_planes": _arguments.planes("clip_planes", clip_planes, _numbers),
