@@ -167,6 +167,18 @@ bool leaveOneFace(const NodeSplat& a, const glm::dvec3& inward_of_a, const NodeS
   return seen_in(a, p, b, q) < kSameFace && seen_in(b, q, a, p) < kSameFace;
 }
 
+bool leadApart(const NodeSplat& a, const glm::dvec3& inward_of_a, const NodeSplat& b,
+               const glm::dvec3& inward_of_b) {
+  constexpr double kApart = -0.1;  // cosine
+  const JointLine *of_a = a.lineAlong(inward_of_a), *of_b = b.lineAlong(inward_of_b);
+  const glm::dvec3 p = of_a != nullptr ? of_a->exactInward() : inward_of_a;
+  const glm::dvec3 q = of_b != nullptr ? of_b->exactInward() : inward_of_b;
+  const glm::dvec3 q_in_a = inFrameOf(a.splat, b.splat.factor() * q);
+  const glm::dvec3 p_in_b = inFrameOf(b.splat, a.splat.factor() * p);
+  return !(glm::dot(p, q_in_a) > kApart * glm::length(q_in_a)) &&
+         !(glm::dot(q, p_in_b) > kApart * glm::length(p_in_b));
+}
+
 std::vector<JointSide> sidesOf(std::span<const NodeSplat* const> parts, std::span<const size_t> group,
                                JointFrames frames) {
   std::vector<JointSide> sides;

@@ -66,6 +66,12 @@ void goOnAcross(size_t axis, const JointLine& joined, NodeSplat& behind, std::sp
 bool leaveOneFace(const NodeSplat& a, const glm::dvec3& inward_of_a, const NodeSplat& b,
                   const glm::dvec3& inward_of_b);
 
+/// Whether two directions lead away from one another as each of the two cells sees it. One alone is not enough:
+/// in the frame of a thin cell all that leans out of its layer points across it, as the row of a cell whose layer
+/// bends does.
+bool leadApart(const NodeSplat& a, const glm::dvec3& inward_of_a, const NodeSplat& b,
+               const glm::dvec3& inward_of_b);
+
 /// Finds which halves of two coincident nodes lie opposite to one another, across a joint: calls visit(n,
 /// m, cosine) for the directions n of a's border code that are opposite to directions m of b's. Directions
 /// on one line have the cosine -1.
@@ -78,7 +84,7 @@ void forEachOpposite(const NodeSplat& a, const NodeSplat& b, JointFrames frames,
       const glm::dvec3 inward(of_a.axis[static_cast<size_t>(n)]), other(of_b.axis[static_cast<size_t>(m)]);
       const glm::dvec3 seen = inFrameOf(a.splat, b.splat.factor() * other);
       const double cosine = glm::dot(inward, seen) / glm::length(seen);
-      if (!(cosine > kOpposite))
+      if (!(cosine > kOpposite) && (frames == JointFrames::kCells || leadApart(a, inward, b, other)))
         visit(n, m, cosine);
       else if (frames == JointFrames::kRows && leaveOneFace(a, inward, b, other))
         visit(n, m, -1.0);

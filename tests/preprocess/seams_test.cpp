@@ -287,6 +287,35 @@ TEST_F(Seams, OfAClosedRowOfThinLayersLeaveItAsIfItHadNeverBeenCut) {
   }
 }
 
+TEST_F(Seams, OfAClosedRowOfASphereKeepTheirShapesAndValues) {
+  // Ten degrees apart on a sphere, and layers of 20 m: in the frame of a half cell the row of the other half points
+  // across the layers.
+  constexpr int kAround = 36;
+  MappedBlock block(kAround + 1, 7, 9, [](double i, double j, double k) {
+    const double angle = 2 * M_PI / kAround * std::fmod(i, kAround), latitude = M_PI / 18 * (j - 3),
+                 r = 6371 + 0.02 * k;
+    return r * glm::dvec3(std::cos(latitude) * std::cos(angle), std::cos(latitude) * std::sin(angle),
+                          std::sin(latitude));
+  });
+  block.addScalar([](const glm::dvec3& p) { return 10 + 50 * (glm::length(p) - 6371); });
+  const Places places = mergeBlocks({block});
+  const NodeSplats splats = block.splats();
+  for (const uint64_t j : {0u, 1u, 3u, 6u})
+    for (const uint64_t k : {0u, 1u, 4u, 8u}) {
+      const size_t beside = block.at(5, j, k);
+      const auto at_seam = std::find_if(places.begin(), places.end(), [&](const auto& place) {
+        return place.second.node.node == block.at(0, j, k);
+      });
+      ASSERT_NE(at_seam, places.end());
+      const Piece* const seam = &at_seam->second;
+      const auto found = singularValues(seam->node.splat.factor()),
+                 expected = singularValues(splats.splats[beside].splat.factor());
+      for (int n = 0; n < 3; ++n) EXPECT_NEAR(found[n] / expected[n], 1, 0.03) << j << ' ' << k << ' ' << n;
+      EXPECT_NEAR(seam->value.mean, splats.values[beside].mean, 0.15)
+          << j << ' ' << k;  // of layers that differ by 1
+    }
+}
+
 TEST_F(Seams, DoNotJoinTheNodesOfAWallLayer) {
   // Eight units in the last place apart: still the seam's 35 pairs and no others.
   merge(facesOf(pipe(1e-6f)), 64 << 20, 4);
