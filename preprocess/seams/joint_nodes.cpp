@@ -30,11 +30,14 @@ bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind) {
   return false;
 }
 
-void OpenBorders::add(const Splat& part, uint32_t border_code, uint32_t closed) {
-  const InwardAxes inward = inwardAxes(border_code);
-  for (int a = 0; a < inward.count; ++a)
-    inward_.push_back({part.factor() * glm::dvec3(inward.axis[static_cast<size_t>(a)]), parts_,
-                       inward.hasFace(a), (closed >> a & 1) != 0});
+void OpenBorders::add(const NodeSplat& part, uint32_t closed, JointFrames frames) {
+  const InwardAxes inward = inwardAxes(part.border_code);
+  for (int a = 0; a < inward.count; ++a) {
+    const glm::dvec3 axis(inward.axis[static_cast<size_t>(a)]);
+    const JointLine* const line = frames == JointFrames::kRows ? part.lineAlong(axis) : nullptr;
+    inward_.push_back({part.splat.factor() * (line != nullptr ? line->exactInward() : axis), parts_,
+                       inward.hasFace(a), (closed >> a & 1) != 0, line != nullptr});
+  }
   ++parts_;
 }
 
@@ -51,7 +54,8 @@ LayeredBorder OpenBorders::of(const Splat& merged, std::span<const Layer> layers
     const glm::dvec3& direction = directions[n];
     bool closed = inward_[n].closed;
     for (size_t m = 0; m < directions.size(); ++m)
-      closed |= inward_[m].part != inward_[n].part && glm::dot(directions[m], direction) < kOpposite;
+      closed |= inward_[m].part != inward_[n].part && !(inward_[m].has_line && inward_[n].has_line) &&
+                glm::dot(directions[m], direction) < kOpposite;
     if (closed) continue;
     const auto same = std::find_if(open.begin(), open.end(), [&](const Open& other) {
       return glm::dot(glm::normalize(other.along), direction) > kSimilar;
@@ -218,7 +222,7 @@ void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values
     for (const JointSide& side : sides) closed |= 1u << side.direction;
     rows_.add({part, half.position - origin_, values, values_of_half_}, sides);
   }
-  borders_.add(part.splat, part.border_code, closed);
+  borders_.add(part, closed, sides.empty() ? JointFrames::kCells : frames_);
   if (part.node > lowest_.splat.node) return;
   lowest_.splat = part;
   sides_.assign(sides.begin(), sides.end());

@@ -42,8 +42,9 @@ class OpenBorders {
     inward_.clear();
     parts_ = 0;
   }
-  /// `closed`: bit n, the code's direction n leads to a side that another part is known to lie on.
-  void add(const Splat& part, uint32_t border_code, uint32_t closed = 0);
+  /// `closed`: bit n, the code's direction n leads to a side that another part is known to lie on. By kRows,
+  /// directions that have lines are closed so alone: angles say nothing where thin layers bend.
+  void add(const NodeSplat& part, uint32_t closed, JointFrames frames);
   /// The half cell of `merged`, the parts' splat. A direction inwards is closed by another part's opposite
   /// one, and several parts' similar ones are one, with a face to be cut at if all have; angles are measured
   /// in the merged cell's own frame, where thin cells are round.
@@ -65,6 +66,7 @@ class OpenBorders {
     size_t part;
     bool face;
     bool closed = false;
+    bool has_line = false;
   };
   std::vector<Inward> inward_;
   size_t parts_ = 0;
