@@ -4,7 +4,7 @@
     bench/true_volumes.py FOLDER [--only REGEX] [--quick] [--program PROGRAM] [--dump DUMP_CACHE] [--convert=OPTION ...] [--json OUT.json]
 
 Each grid has one trouble of real ones: cells that grow quickly from a wall, closed rows, one layer of cells, joints at an angle,
-steep terrain, poles, separate points. The columns:
+steep terrain, poles, an ocean's floor in steps. The columns:
 
 weights         sum of the splats' weights over the grid's volume (of trilinear cells, exact by quadrature)
 uniform         the least and the largest total optical depth of four views, over the exact one
@@ -57,15 +57,21 @@ def determinant(corners, u, v, w):
     return np.abs(np.einsum("ni,ni->n", x_u, np.cross(x_v, x_w)))
 
 
+def drawn_cells(xyz, values):
+    """Corners of the cells that are drawn (those without NaN), and the values at them (or theirs)."""
+    of_nodes = values.shape == xyz.shape[:3]
+    f = cell_corners(np.repeat(values[..., None], 3, -1))[..., :1] if of_nodes else values.reshape(-1, 1, 1)
+    there = ~np.isnan(f).any(axis=(1, 2))
+    return cell_corners(xyz)[there], f[there], of_nodes
+
+
 def volumes(blocks, threshold, points):
     """The volume of the trilinear cells, and of what is above the threshold."""
     at, weight = np.polynomial.legendre.leggauss(points)
     at, weight = (at + 1) / 2, weight / 2
     whole = above = 0.0
     for xyz, values in blocks:
-        corners = cell_corners(xyz)
-        of_nodes = values.shape == xyz.shape[:3]
-        f = cell_corners(np.repeat(values[..., None], 3, -1))[..., :1] if of_nodes else values.reshape(-1, 1, 1)
+        corners, f, of_nodes = drawn_cells(xyz, values)
         for u, a in zip(at, weight):
             for v, b in zip(at, weight):
                 for w, c in zip(at, weight):
@@ -89,10 +95,9 @@ def depths_of(blocks, middle, scale, points):
     are those of a sequence of low discrepancy, so that none line up with squares."""
     count = PIXELS // BLOCK
     sums = {view: np.zeros(count * count) for view in VIEWS}
-    cells_of_all = sum(np.prod(np.subtract(xyz.shape[:3], 1)) for xyz, _ in blocks)
-    per_cell = max(64, -(-points // int(cells_of_all)))
-    for xyz, _ in blocks:
-        corners = cell_corners(xyz)
+    cells_of_blocks = [drawn_cells(xyz, values)[0] for xyz, values in blocks]
+    per_cell = max(64, -(-points // sum(len(corners) for corners in cells_of_blocks)))
+    for corners in cells_of_blocks:
         first = np.arange(len(corners)) * float(per_cell)
         for n in range(per_cell):
             u, v, w = (((first + n) * 1.2207440846057596 ** -axis % 1)[:, None] for axis in (1, 2, 3))
@@ -203,6 +208,19 @@ def grids():
     twist = lattice(np.linspace(1, 2, 13), np.linspace(0, 2 * np.pi, 49), np.linspace(0, 1, 9),
                     lambda r, t, z: polar(r, t + 3 * r * z, 4 * z))
     yield "field_lines", [nodes(closed(twist, 1), height)]
+    levels = lattice(np.linspace(0, 10, 26), np.linspace(0, 8, 21), -growing(0.05, 1.2, 14), lambda x, y, z: (x, y, z))
+    yield "sea_floor", [with_land(*nodes(levels, lambda x, y, z: z + 0.2 * x))]
+    yield "sea_floor_cells", [with_land(*cells(levels, lambda x, y, z: z + 0.2 * x))]
+
+
+def with_land(xyz, values):
+    """A sea of z-levels, whose floor is steps, with samples of land here and there, and single ones of water in the land."""
+    middles = xyz if values.shape == xyz.shape[:3] else cell_corners(xyz).mean(axis=1).reshape(*values.shape, 3)
+    x, y, z = np.moveaxis(middles, -1, 0)
+    water = z > -(1 + 4 * np.sin(0.3 * x) ** 2 + 0.6 * y) * (1 + 0.2 * np.sin(1.7 * x + 2.3 * y))
+    alone = np.zeros(water.shape, bool)
+    alone[2::5, 2::5, -3::-4] = True
+    return xyz, np.where(water ^ (alone & (z < -1)), values, np.nan)
 
 
 def write_plot3d(path, blocks):
@@ -246,7 +264,7 @@ def read_pfm(path):
 def measure(arguments, name, blocks):
     path = arguments.folder / name
     values = np.concatenate([v.ravel() for _, v in blocks])
-    low, high = values.min(), values.max()
+    low, high = np.nanmin(values), np.nanmax(values)
     middle = 0.5 * (low + high)
     exact, above = volumes(blocks, middle, 6)
     cache = path.with_suffix(".splats")
@@ -307,6 +325,8 @@ LIMITS = {
     "terrain": (0.02, 1.2, 1.06, 9, 0.05),
     "sheared": (0.02, 0.9, 1.05, 10, 0.05),
     "field_lines": (0.02, 1.8, 1.09, 10, 0.05),
+    "sea_floor": (0.02, 2.2, 1.13, 12, 0.05),
+    "sea_floor_cells": (0.02, 1.5, 1.07, 12, 0.05),
 }
 
 
