@@ -256,10 +256,11 @@ TEST_F(InfoOfACache, StepsThatAreTooWideAreWarnedOf) {
   for (const std::string precision : {"normal", "auto"}) {
     run({"convert", folder_ / "tail.vts", "-o", folder_ / (precision + ".splats"), "--value-precision",
          precision});
-    for (const std::vector<std::string>& asked :
-         {std::vector<std::string>{"--iso", "0.5"}, std::vector<std::string>{"--range", "0.2,0.8"}}) {
-      const ProgramResult picture = run({"render", folder_ / (precision + ".splats"), "-o", folder_ / "p.png",
-                                         "--size", "32x32", "--tf", "viridis", asked[0], asked[1]});
+    for (const Words& asked : {Words{"--iso", "0.5"}, Words{"--range", "0.2,0.8"},
+                               Words{"--range", "0,1e5", "--asinh", "0.5,0.3"}}) {
+      const ProgramResult picture = run(Words{"render", folder_ / (precision + ".splats"), "-o",
+                                              folder_ / "p.png", "--size", "32x32", "--tf", "viridis"} +
+                                        asked);
       const bool warned =
           picture.err.find("its stored values, ") != std::string::npos &&
           picture.err.find("convert again, with --value-precision auto or fine") != std::string::npos;

@@ -239,7 +239,7 @@ void exportCache(ExportArguments& arguments) {
   PictureChoice choice(cache, variable, glm::dvec3(1));
   const TransferFunction function = choice.function(arguments.scalar);
   for (const std::string& note : function.notes()) printMessage("note: {}", note);
-  const std::string finer = rangeFinerThanStored(cache, variable, function.range());
+  const std::string finer = functionFinerThanStored(cache, variable, function);
   if (!finer.empty()) printMessage("warning: {}", finer);
 
   if (!arguments.no_comparison) requireThreads();  // before the file is written

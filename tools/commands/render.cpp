@@ -184,7 +184,7 @@ void render(const RenderArguments& given) {
   for (const auto& [of, function] : {std::pair(variable, &transfer_function), {shown, &colours}}) {
     const std::string range_warning = rangeMissesScalar(variableFor(cache, of, drawn), *function);
     if (!range_warning.empty()) printMessage("warning: {}", range_warning);
-    const std::string finer = rangeFinerThanStored(cache, of, function->range());
+    const std::string finer = functionFinerThanStored(cache, of, *function);
     if (!finer.empty()) printMessage("warning: {}", finer);
     if (!scalars.colour) break;
   }

@@ -13,7 +13,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kStepsOfRange = 100, kLargestShare = 0.02, kWidestStep = 0.05;
+constexpr double kStepsOfRange = 100, kStepsOfPart = 20, kLargestShare = 0.02, kWidestStep = 0.05;
 
 /// How bricks are coded, by the scalar's spread as the histogram has it.
 ValueCoding codingOf(const CacheReader& cache, const std::optional<ValueHistogram>& histogram) {
@@ -55,15 +55,28 @@ double storedStep(const CacheReader& cache, size_t variable, double lower, doubl
   return stepOf(cache, variable, codingOf(cache, stepHistogram(cache, variable)), lower, upper);
 }
 
-std::string rangeFinerThanStored(const CacheReader& cache, size_t variable,
-                                 const std::pair<double, double>& range) {
-  const auto [lower, upper] = range;
-  const double step = storedStep(cache, variable, lower, upper);
-  if (!(upper > lower) || !(upper - lower < kStepsOfRange * step)) return {};
-  return fmt::format(
-      "the range {:.6g}..{:.6g} of {} is finer than its stored values, which have steps of up to {:.2g} "
-      "there; {}",
-      lower, upper, cache.manifest().variables[variable].name, step, remedy(cache));
+std::string functionFinerThanStored(const CacheReader& cache, size_t variable,
+                                    const TransferFunction& function) {
+  struct Part {
+    const char* name;
+    double lower, upper, steps;
+  };
+  const auto [lower, upper] = function.range();
+  std::vector<Part> parts{{"the range", lower, upper, kStepsOfRange}};
+  if (const std::optional<AsinhScale> asinh = function.axis().asinh)
+    parts.push_back({"the linear part of asinh,", std::max(lower, asinh->centre - asinh->width),
+                     std::min(upper, asinh->centre + asinh->width), kStepsOfPart});
+  if (function.logScale())
+    parts.push_back({"the first decade,", lower, std::min(upper, 10 * lower), kStepsOfPart});
+  for (const Part& part : parts) {
+    const double step = storedStep(cache, variable, part.lower, part.upper);
+    if (part.upper > part.lower && part.upper - part.lower < part.steps * step)
+      return fmt::format(
+          "{} {:.6g}..{:.6g} of {} is finer than its stored values, which have steps of up to {:.2g} "
+          "there; {}",
+          part.name, part.lower, part.upper, cache.manifest().variables[variable].name, step, remedy(cache));
+  }
+  return {};
 }
 
 std::vector<std::string> isovaluesFinerThanStored(const CacheReader& cache, size_t variable,

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "render/colour/transfer_function.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
@@ -15,9 +15,10 @@ namespace curvisplat {
 /// The widest step, twice the largest error, of stored values between `lower` and `upper`; 0 if there are none.
 double storedStep(const CacheReader& cache, size_t variable, double lower, double upper);
 
-/// A warning if the range has fewer than 100 steps; empty otherwise.
-std::string rangeFinerThanStored(const CacheReader& cache, size_t variable,
-                                 const std::pair<double, double>& range);
+/// A warning if the function's range has fewer than 100 steps, or fewer than 20 within the width around the centre of an asinh, or in the
+/// first decade of a logarithm; empty otherwise.
+std::string functionFinerThanStored(const CacheReader& cache, size_t variable,
+                                    const TransferFunction& function);
 
 /// A warning for each isovalue from which more than 2 % of the volume lies no further than a step, where its surface follows the values'
 /// rounding, or where steps are wider than 5 % of its own scale (ValueSpread). `isovalues`: as given, of numbers.

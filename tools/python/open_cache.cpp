@@ -313,7 +313,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments, image,
         {manifest, manifest.variables[scalars.opacity.variable], function, at, frame, picture.statistics});
     const TransferFunction& colours = scalars.colour ? scalars.colour->function : function;
-    if (std::string finer = rangeFinerThanStored(reader_, shown, colours.range()); !finer.empty())
+    if (std::string finer = functionFinerThanStored(reader_, shown, colours); !finer.empty())
       picture.warnings.push_back(std::move(finer));
     const bool iso_of_colours = isoOfColours(arguments.opacity, arguments.scalar);
     for (std::string& finer : isovaluesFinerThanStored(
