@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "preprocess/shape/merge.h"
+#include "preprocess/shape/sample_range.h"
 #include "preprocess/shape/shape.h"
 
 namespace curvisplat {
@@ -147,17 +148,16 @@ void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own
   }
   for (size_t field = 0; field < fields; ++field) {
     double rest = 0;
-    float least = own[field], most = own[field];
+    SampleRange range(own[field]);
     for (size_t n = 0; n < neighbours.steps.size(); ++n) {
       const float value = neighbours.values[n * fields + field];
       rest += (static_cast<double>(value) - own[field]) - glm::dot(gradients[field], neighbours.steps[n]);
-      least = std::min(least, value);
-      most = std::max(most, value);
+      range.add(value);
     }
     const double second = reach > 0 ? 3 * 2 * rest / reach : 0.0;  // of all three columns
-    const double mean = std::clamp<double>(own[field] + kBend * second, least, most);
     // Since h = S g, the slope A⁻¹ h is Aᵀ g.
-    values[field] = {mean, gradients[field] * splat.splat.factor(), 0.0};
+    values[field] =
+        range.bounded({own[field] + kBend * second, gradients[field] * splat.splat.factor(), 0.0});
   }
 }
 

@@ -11,6 +11,7 @@
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/shape/covered_part.h"
+#include "preprocess/shape/sample_range.h"
 #include "preprocess/shape/shape.h"
 #include "stream/base/error.h"
 #include "stream/model/corrections.h"
@@ -256,20 +257,20 @@ void Cells::addCell(const std::array<uint64_t, 3>& index, uint32_t half) {
     for (const std::vector<float>& f : in_.nodes->scalars) {
       const double here = f[node];
       glm::dvec3 differences;
-      double second = 0, least = here, most = here;
+      double second = 0;
+      SampleRange range(here);
       for (int axis = 0; axis < 3; ++axis) {
         const double f_before = f[before[axis]], f_after = f[after[axis]];
         differences[axis] = per_step[axis] * (f_after - f_before);
         if (before[axis] != node && after[axis] != node)
           second += stretch[axis] * stretch[axis] * ((f_after - here) - (here - f_before));
-        least = std::min({least, f_before, f_after});
-        most = std::max({most, f_before, f_after});
+        range.add(f_before);
+        range.add(f_after);
       }
       // What tangents miss where the scalar bends: node_splats.h.
       const glm::dvec3 gradient = gradient_of(differences);
-      const double mean = std::clamp(
-          here + glm::dot(gradient, drift) + kBend * (second - glm::dot(gradient, bend)), least, most);
-      *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
+      const double mean = here + glm::dot(gradient, drift) + kBend * (second - glm::dot(gradient, bend));
+      *value++ = range.bounded({mean, scale * rotate(gradient * jacobian), 0.0});
     }
   };
   bool is_left = true;  // a part of the cell at least

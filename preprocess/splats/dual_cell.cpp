@@ -6,6 +6,7 @@
 #include <glm/mat3x3.hpp>
 
 #include "preprocess/grid/hexahedron.h"
+#include "preprocess/shape/sample_range.h"
 #include "preprocess/shape/shape.h"
 #include "preprocess/splats/inner_nodes.h"
 
@@ -215,21 +216,26 @@ std::optional<PieceSplat> splatOfPiece(const CollapsedNode& node, std::span<cons
   }
   out.border_code = count > 0 ? packBorderCode({ends.data(), count}, (1u << count) - 1) : kNoBorder;
 
+  // Nodes at a pole that differ by rounding alone have no direction from one to the other.
+  double longest = 0;
+  for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, glm::length(steps[axis]));
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(glm::length(steps[axis]) > kCollapsed * longest)) steps[axis] = glm::dvec3(0.0);
   const LatticeGradient gradient_of(steps);
   const glm::dmat3 factor = out.splat.factor();
   for (size_t v = 0; v < scalars.size(); ++v) {
     const float* const f = scalars[v];
-    double least = f[node.at], most = least;
+    SampleRange range(f[node.at]);
     glm::dvec3 differences;
     for (size_t axis = 0; axis < 3; ++axis) {
       const double before = f[node.at + node.neighbours.before[axis]],
                    after = f[node.at + node.neighbours.after[axis]];
       differences[static_cast<int>(axis)] = 0.5 * (after - before);
-      least = std::min({least, before, after});
-      most = std::max({most, before, after});
+      range.add(before);
+      range.add(after);
     }
     const glm::dvec3 gradient = gradient_of(differences);
-    values[v] = {std::clamp(f[node.at] + glm::dot(gradient, middle), least, most), gradient * factor, 0.0};
+    values[v] = range.bounded({f[node.at] + glm::dot(gradient, middle), gradient * factor, 0.0});
   }
   return out;
 }

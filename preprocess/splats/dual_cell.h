@@ -66,6 +66,9 @@ double dualVolume(const NodeLattice& nodes, ptrdiff_t at, const std::array<ptrdi
 /// Around a wall from which cells grow by 1.35, a uniform medium is 1.7 % too dense otherwise, and 5 % too thin at its end.
 std::array<double, 3> widthGrowth(const NodeLattice& nodes, ptrdiff_t at, const Neighbours& neighbours);
 
+/// Nodes at this distance, of the longest to others, are one: those of a pole, which rounding alone sets apart.
+inline constexpr double kCollapsed = 1e-9;
+
 /// A node whose cell has collapsed, at a pole or on a singular line.
 struct CollapsedNode {
   const NodeLattice& nodes;

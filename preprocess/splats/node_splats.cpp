@@ -196,17 +196,19 @@ double NodeWindow::weightOf(ptrdiff_t at, uint64_t i, double of_neighbours) cons
   return dualVolume(lattice_, at, strides, there) * static_cast<double>(kCellPoints) / kept;
 }
 
-constexpr double kCollapsed = 1e-9;  // of the distance to the nearest neighbour that is elsewhere
-
 /// Finds the piece of the last node, whose cell has collapsed. False if its piece has no volume either.
 bool NodeWindow::takePiece(uint64_t i, ptrdiff_t at, const Neighbours& neighbours,
                            const std::array<double, 3>& inwards) {
   if (!rules_.dual_cells || (in_.covered && in_.covered[at] != 0)) return false;
-  double shortest = std::numeric_limits<double>::infinity();  // of the columns: thin cells have not collapsed
-  for (int axis = 0; axis < 3; ++axis)
-    shortest = std::min(shortest, glm::distance(lattice_.position(at + neighbours.after[axis]),
-                                                lattice_.position(at + neighbours.before[axis])));
-  if (shortest > kCollapsed * lattice_.spacing(at, neighbours)) return false;
+  // Lengths of the columns: thin cells have not collapsed.
+  double shortest = std::numeric_limits<double>::infinity(), longest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double length = glm::distance(lattice_.position(at + neighbours.after[axis]),
+                                        lattice_.position(at + neighbours.before[axis]));
+    shortest = std::min(shortest, length);
+    longest = std::max(longest, length);
+  }
+  if (shortest > kCollapsed * longest) return false;
   const CollapsedNode collapsed{lattice_,       at,      {1, row_stride_, plane_stride_}, neighbours,
                                 cellsAt(at, i), inwards, smallestAxis(at, neighbours)};
   const auto piece = splatOfPiece(collapsed, scalars_,

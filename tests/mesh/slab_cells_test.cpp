@@ -11,6 +11,7 @@
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/mesh_origin.h"
+#include "preprocess/moments/mesh_splats.h"
 #include "preprocess/shape/shape.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/array_mesh.h"
@@ -184,6 +185,19 @@ TEST_F(SlabCells, HaveTheSameBytesForAnyThreadsMemoryAndRanks) {
                       {.threads = 1, .bucket_splats = 3000, .ranks = 2},
                       {.threads = 1, .bucket_splats = 3000, .ranks = 3}});
   }
+}
+
+TEST(CellSlopes, StayAmongTheNeighbours) {
+  // The middles of slivers lie next to the cell's own, which is of length 1.
+  const std::array<glm::dvec3, 3> steps{glm::dvec3(1e-4, 0, 0), {0, -1e-4, 0}, {0, 0, 1e-4}};
+  const std::array<float, 3> values{3, 7, 5};
+  NodeSplat splat;
+  SplatScalar of_cell;
+  const CellBody body{.volume = 1, .centre = glm::dvec3(1, 2, 3), .xx = 1, .yy = 1, .zz = 1};
+  splatOfCell(0, body, std::array{4.0f}, {steps, values}, splat, {&of_cell, 1});
+  EXPECT_LE(glm::length(of_cell.slope), 4 * (7 - 3) + 1e-9);
+  EXPECT_GT(glm::length(of_cell.slope), 1);
+  EXPECT_TRUE(of_cell.mean >= 3 && of_cell.mean <= 7) << of_cell.mean;
 }
 
 }  // namespace

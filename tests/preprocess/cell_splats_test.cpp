@@ -380,6 +380,19 @@ TEST(CellSplats, OfUnevenCellsAreStretchedByTheirNeighbours) {
   }
 }
 
+TEST(CellSplats, WhoseMiddlesNearlyCoincideStayAmongTheSamples) {
+  // Every second cell is folded back over the one before it.
+  CellBlock zigzag(8, 4, 4,
+                   [](double i, double j, double k) { return glm::dvec3(std::fmod(i, 2) + 1e-3 * i, j, k); });
+  zigzag.addCellScalar([](const glm::dvec3& p) { return std::sin(1e4 * p.x); });
+  const NodeSplats out = zigzag.cellSplats();
+  ASSERT_EQ(out.values.size(), 63u);
+  for (size_t n = 0; n < out.values.size(); ++n) {
+    EXPECT_LE(std::abs(out.values[n].mean), 1) << n;
+    EXPECT_LE(glm::length(out.values[n].slope), 8) << n;
+  }
+}
+
 TEST(CellSplats, OfSingularAndFoldedCellsAreFinite) {
   // A polar axis: wedges, not degenerate, with the volume of the prism.
   CellBlock polar(9, 4, 3, [](double i, double j, double k) {

@@ -352,6 +352,27 @@ TEST(NodeSplats, OnAPolarAxisHaveTheVolumeAndShapeOfTheirWedges) {
   EXPECT_GT(glm::normalize(out.splats[grid.at(3, 0, 0)].splat.factor() * glm::dvec3(inward.axis[0])).z, 0.99);
 }
 
+TEST(NodeSplats, AtAPoleThatIsNoPointStayAmongTheSamples) {
+  // The cosine of 90 degrees is 6e-17: the nodes of the first row lie 4e-13 km from the axis, and a component of the wind
+  // differs from one to the next.
+  MappedBlock grid(25, 5, 3, [](double i, double j, double k) {
+    const double east = i * M_PI / 12, north = M_PI / 2 - j * M_PI / 240, r = 6371 + 2 * k;
+    return glm::dvec3(r * std::cos(north) * std::cos(east), r * std::cos(north) * std::sin(east),
+                      r * std::sin(north));
+  });
+  std::vector<float>& wind = grid.nodes.scalars.emplace_back();
+  for (size_t n = 0; n < grid.block.nodes(); ++n)
+    wind.push_back(static_cast<float>(std::sin(static_cast<double>(n % 25) * M_PI / 12)));
+  const NodeSplats out = grid.splats();
+  EXPECT_EQ(out.degenerate, 0u);
+  for (size_t n = 0; n < out.splats.size(); ++n) {
+    EXPECT_LE(std::abs(out.values[n].mean), 1) << n;
+    EXPECT_LE(glm::length(out.values[n].slope), 2) << n;
+  }
+  const SplatScalar& pole = out.values[grid.at(6, 0, 1)];
+  EXPECT_LT(glm::length(pole.slope), 0.1) << "it is 1 there, and around it along j and k";
+}
+
 TEST(NodeSplats, OnAPolarAxisWereFlooredAndHadNoVolume) {
   MappedBlock grid(13, 5, 4, [](double i, double j, double k) {
     return glm::dvec3(j * std::cos(i * M_PI / 6), j * std::sin(i * M_PI / 6), k);
