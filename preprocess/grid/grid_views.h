@@ -53,7 +53,7 @@ std::unique_ptr<GridSource> reordered(const GridSource& source, std::vector<uint
 /// The parts of a cell are drawn if the cell is: a new node is blanked unless it lies in a cell whose nodes
 /// are all there. A node is not there where it is blanked, or where a coordinate or one of the node-centred
 /// scalars that are read is not finite or has the value `blank_value`. A new node is fringe if all nodes
-/// that it is interpolated from are. A part has the value of its cell.
+/// that it is interpolated from are. The parts of a cell have its value on the mean, and none beyond the cells beside it.
 ///
 /// Reads the nodes around a box alone. Throws Error if there would be too many nodes to count.
 std::unique_ptr<GridSource> refined(std::unique_ptr<GridSource> source, const Refinement& refinement,

@@ -59,11 +59,10 @@ double changeBetween(const CellStep& before, const CellStep& after) {
 }
 
 /// How much the value of a cell at a border changes, by the step away from the border and the further difference, to the second
-/// cell: not at all unless both have one sign; and along the axis no part of the cell has another sign than `value`.
-double changeAtBorder(double value, const CellStep& step, double further) {
+/// cell: not at all unless both have one sign.
+double changeAtBorder(const CellStep& step, double further) {
   if (!(step.difference * further > 0)) return 0;
-  return std::copysign(std::min({std::abs(step.change), 2 * std::abs(further), 2 * std::abs(value)}),
-                       step.difference);
+  return std::copysign(std::min(std::abs(step.change), 2 * std::abs(further)), step.difference);
 }
 
 /// Interpolation by the parts of a cell: exact where both ends are equal, and the same from either end.
@@ -162,7 +161,8 @@ class NodesAround {
   }
 
   /// The value of the part of a cell whose lowest node is the refined `node`. A cell's value is that of its middle, and the mean
-  /// of its parts; among cells of one sign no part has another. `isThere(cell)`: whether a cell has a value, by its lowest node.
+  /// of its parts, none of which is beyond the cell and those that it shares faces with: a cell with the largest value of these
+  /// does not change. `isThere(cell)`: whether a cell has a value, by its lowest node.
   template <typename IsThere>
   float valueOfPart(const NodeArrays& grid, const std::vector<float>& values,
                     const std::array<uint64_t, 3>& node, const IsThere& isThere) const {
@@ -174,21 +174,26 @@ class NodesAround {
     }
     if (!isThere(at)) return values[at];
     const double value = values[at];
-    const auto hasOtherSign = [&](size_t cell) { return isThere(cell) && value * values[cell] < 0; };
-    double sum = 0, most = 0;  // at most what a part differs by
-    bool signs_differ = false;
+    double least = value, most = value;
+    const auto include = [&](size_t cell) {
+      if (!isThere(cell)) return;
+      least = std::min<double>(least, values[cell]);
+      most = std::max<double>(most, values[cell]);
+    };
+    double sum = 0, farthest = 0;  // what a part differs by, at most
     for (size_t axis = 0; axis < 3; ++axis) {
+      if (planes[axis] > 0) include(at - strides_[axis]);
+      if (planes[axis] + 2 < counts_[axis]) include(at + strides_[axis]);
       if (parts_[axis] == 1) continue;
       const auto parts = static_cast<double>(parts_[axis]);
       const double share = (static_cast<double>(2 * (node[axis] % parts_[axis]) + 1) - parts) / (2 * parts);
       const double change = changeAlong(axis, grid, values, {at, planes[axis]}, isThere);
       sum += share * change;
-      most += 0.5 * std::abs(change);
-      signs_differ |= (planes[axis] > 0 && hasOtherSign(at - strides_[axis])) ||
-                      (planes[axis] + 2 < counts_[axis] && hasOtherSign(at + strides_[axis]));
+      farthest += 0.5 * std::abs(change) * (parts - 1) / parts;
     }
-    // Changes along several axes add up.
-    if (!signs_differ && most > std::abs(value)) sum *= std::abs(value) / most;
+    // Changes along several axes add up, and those of a border lead away from the cells beside it.
+    const double room = std::min(value - least, most - value);
+    if (farthest > room) sum *= room / farthest;
     return static_cast<float>(value + sum);
   }
 
@@ -223,10 +228,10 @@ class NodesAround {
       return changeBetween(stepTo(at - stride, at, stride, grid, values),
                            stepTo(at + stride, at, stride, grid, values));
     if (after && isThere(at + 2 * stride))
-      return changeAtBorder(values[at], stepTo(at + stride, at, stride, grid, values),
+      return changeAtBorder(stepTo(at + stride, at, stride, grid, values),
                             double{values[at + 2 * stride]} - values[at + stride]);
     if (before && plane > 1 && isThere(at - 2 * stride))
-      return -changeAtBorder(values[at], stepTo(at - stride, at, stride, grid, values),
+      return -changeAtBorder(stepTo(at - stride, at, stride, grid, values),
                              double{values[at - 2 * stride]} - values[at - stride]);
     return 0;
   }

@@ -249,7 +249,9 @@ TEST(RefinedSource, PartsOfCellsFollowALinearField) {
   const NodeArrays nodes = allNodes(*fine, 0);
   const GridBlock& block = fine->description().blocks[0];
   forEachIndex(block, [&](const Index& n) {
-    if (n[0] + 1 == block.ni || n[1] + 1 == block.nj || n[2] + 1 == block.nk) return;
+    // Cells at a border where no cell beside them has a larger value have no values beyond their own.
+    const bool at_border = n[0] < 2 || n[0] >= 14 || n[1] != 1 || n[2] < 4 || n[2] >= 12;
+    if (at_border) return;
     const size_t at = atOf(block, n);
     const double x = 0.5 * (nodes.x[at] + nodes.x[at + 1]);
     const double expected = field(x, static_cast<double>(n[1]) + 0.5, (static_cast<double>(n[2]) + 0.5) / 4);
@@ -278,6 +280,36 @@ TEST(RefinedSource, PartsOfCellsHaveItsMeanAndNoNewExtremes) {
   }
 }
 
+TEST(RefinedSource, PartsStayAmongTheCellsAround) {
+  const auto valueOf = [](const Index& n) {
+    return std::sin(3.0 * static_cast<double>(n[0])) * std::cos(2.0 * static_cast<double>(n[1])) +
+           0.5 * static_cast<double>(n[2]);
+  };
+  const auto fine = refined(growingCells(valueOf), 2);
+  const NodeArrays nodes = allNodes(*fine, 0);
+  const GridBlock& block = fine->description().blocks[0];
+  const Index cells{8, 3, 4};
+  size_t differ = 0;
+  forEachIndex(block, [&](const Index& n) {
+    if (n[0] + 1 == block.ni || n[1] + 1 == block.nj || n[2] + 1 == block.nk) return;
+    const Index cell{n[0] / 2, n[1] / 2, n[2] / 2};
+    double least = valueOf(cell), most = least;
+    for (size_t axis = 0; axis < 3; ++axis)
+      for (const uint64_t beside :
+           {cell[axis] - std::min<uint64_t>(cell[axis], 1), std::min(cell[axis] + 1, cells[axis] - 1)}) {
+        Index other = cell;
+        other[axis] = beside;
+        least = std::min(least, valueOf(other));
+        most = std::max(most, valueOf(other));
+      }
+    const double value = nodes.scalars[0][atOf(block, n)];
+    EXPECT_GE(value, least - 1e-6) << n[0] << ' ' << n[1] << ' ' << n[2];
+    EXPECT_LE(value, most + 1e-6) << n[0] << ' ' << n[1] << ' ' << n[2];
+    differ += std::abs(value - valueOf(cell)) > 0.01;
+  });
+  EXPECT_GT(differ, 100u);
+}
+
 TEST(RefinedSource, PartsOfPositiveCellsArePositive) {
   // Along each axis alone all parts are; the changes along three add up.
   const auto valueOf = [](const Index& n) { return std::pow(2.5, n[0] + n[1] + n[2]); };
@@ -295,7 +327,7 @@ TEST(RefinedSource, PartsOfPositiveCellsArePositive) {
 }
 
 TEST(RefinedSource, PartsOfCellsLeaveOutWhatHasNoValue) {
-  // Beside a cell without a value and one that is infinite, as at a border: the cells' values as far as these.
+  // Beside a cell without a value and one that is infinite, as at a border: their own values.
   const auto fine = refined(growingCells([&](const Index& n) {
                               if (n[0] == 4) return static_cast<double>(kNone);
                               return n[0] == 0 ? std::numeric_limits<double>::infinity() : middleOf(n[0]);
@@ -304,8 +336,10 @@ TEST(RefinedSource, PartsOfCellsLeaveOutWhatHasNoValue) {
   const NodeArrays nodes = allNodes(*fine, 0);
   EXPECT_TRUE(std::isinf(nodes.scalars[0][0]) && std::isinf(nodes.scalars[0][1]));
   EXPECT_TRUE(std::isnan(nodes.scalars[0][8]) && std::isnan(nodes.scalars[0][9]));
-  for (const size_t n : {2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15})
+  for (const size_t n : {4, 5, 12, 13})
     EXPECT_NEAR(nodes.scalars[0][n], 0.5 * (nodes.x[n] + nodes.x[n + 1]), 1e-4) << n;
+  for (const size_t n : {2, 3, 6, 7, 10, 11, 14, 15})
+    EXPECT_NEAR(nodes.scalars[0][n], middleOf(n / 2), 1e-4) << n;
   EXPECT_EQ(nodes.blank[0], 0) << "a cell without a value blanks no nodes";
   expectPartsOfRows(*fine);
 }
