@@ -99,6 +99,34 @@ class Columns(ModelFileTest):
             self.field(f, "face", "layer")
         self.expect("zCoordinates", "out2d_1.nc", "temperature_1.nc", "zCoordinates_1.nc")
 
+    def globe(self, scale):
+        """Eight faces of 45 x 20 degrees around the Earth, the fourth across the date line; layers of 10 m and more, times `scale`."""
+        with File(self.folder / "file.nc", {"node": 16, "face": 8, "corner": 4, "layer": 4, "interface": 5, "time": None}) as f:
+            f.add("mesh", "", 0, "i4", cf_role="mesh_topology", topology_dimension=np.int32(2), node_coordinates="x y", face_node_connectivity="faces")
+            east = np.arange(8)
+            f.add("x", "node", np.tile(np.where(east * 45 + 22.5 > 180, east * 45 - 337.5, east * 45 + 22.5), 2), units="degrees_east", standard_name="longitude")
+            f.add("y", "node", np.repeat([-10.0, 10.0], 8), units="degrees_north", standard_name="latitude")
+            f.add("faces", "face corner", np.stack([east, (east + 1) % 8, (east + 1) % 8 + 8, east + 8], -1), "i4", -1, cf_role="face_node_connectivity")
+            f.add("zw_zw", "time face interface", np.broadcast_to(scale * np.array([0, 10.0, 30, 60, 100]), (1, 8, 5)), units="m")
+            f.add("t", "time face layer", np.ones((1, 8, 4)), "f4", mesh="mesh", location="face")
+
+    def test_faces_across_the_edge_of_a_flat_map(self):
+        self.globe(1)
+        info = self.info("file.nc", "--flat")
+        self.assertIn("1 of 8 faces lie across the edge of the flat map", " ".join(info["warnings"]))
+        cache = self.folder / "a.splats"
+        subprocess.run([PROGRAM, "convert", self.folder / "file.nc", "-o", cache, "--flat", "--overwrite"], check=True, capture_output=True)
+        degree = np.pi / 180 * 6371
+        self.assertAlmostEqual(json.loads((cache / "manifest.json").read_text())["volume"] / (7 * 45 * 20 * degree**2 * 0.1), 1, delta=1e-5)
+
+    def test_flat_cells_far_below_the_sphere(self):
+        """The corners' mean is nearer to the Earth's middle: by the cosines of half of the sides."""
+        self.globe(1)
+        depth = 6371 * (1 - np.cos(np.radians(22.5)) * np.cos(np.radians(10)))
+        self.assertIn(f"lie up to {depth:.3g} km below the sphere, {depth / 0.01:.3g} times the thickness", " ".join(self.info()["warnings"]))
+        self.globe(2e5)
+        self.assertNotIn("below the sphere", " ".join(self.info()["warnings"]))
+
     def test_thicknesses_of_layers(self):
         """MPAS' ocean: below the surface, which is not at 0; below the ground there are none."""
         thickness = np.array([[1.0, 3, 6, 10], [1, 4, 0, 0]])

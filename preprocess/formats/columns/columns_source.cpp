@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <iterator>
 #include <limits>
 #include <numbers>
@@ -67,6 +68,8 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
   globe_ = globeWith(options.globe, !plane, 0.0);
   if (heights_.levels.empty()) spoolHeights(options.temporary_folder);
   describe(options);
+  findCutFaces();
+  noteSagitta();
 }
 
 void ColumnsSource::findTimes(const OpenGridOptions& options) {
@@ -193,6 +196,90 @@ void ColumnsSource::spoolHeights(const std::filesystem::path& folder) {
   node_heights_ = spool.finish();
 }
 
+void ColumnsSource::readHeights(uint64_t level, uint64_t first, std::span<double> out) const {
+  if (heights_.levels.empty())
+    node_heights_.read(level * map_.nodes + first, out);
+  else
+    std::fill(out.begin(), out.end(), heights_.levels[level]);
+}
+
+/// Calls use(face, its nodes) for each; nodes below 0 are none.
+template <typename Use>
+void ColumnsSource::forEachFace(const Use& use) const {
+  for (uint64_t first = 0; first < map_.faces; first += kFacesAtOnce) {
+    const uint64_t count = std::min(kFacesAtOnce, map_.faces - first);
+    const std::vector<int64_t> nodes = nodesOf(first, count);
+    for (uint64_t n = 0; n < count; ++n)
+      use(first + n, std::span(nodes).subspan(n * map_.most_sides, map_.most_sides));
+  }
+}
+
+void ColumnsSource::findCutFaces() {
+  if (globe_.sphere() || !globe_.degrees()) return;
+  std::vector<double> from_middle = readAngles(*map_.longitude, 0, map_.nodes);
+  for (double& longitude : from_middle)
+    longitude = std::remainder(longitude - globe_.middle_longitude, 360.0);
+  forEachFace([&](uint64_t face, std::span<const int64_t> nodes) {
+    double least = 180, most = -180;
+    for (const int64_t node : nodes) {
+      if (node < 0) continue;
+      least = std::min(least, from_middle[static_cast<size_t>(node)]);
+      most = std::max(most, from_middle[static_cast<size_t>(node)]);
+    }
+    if (most - least > 180) cut_faces_.push_back(face);
+  });
+  if (!cut_faces_.empty())
+    description_.warnings.push_back(fmt::format(
+        "{} of {} faces lie across the edge of the flat map, opposite the longitude {:g}, and are left out",
+        cut_faces_.size(), map_.faces, globe_.middle_longitude));
+}
+
+double ColumnsSource::thinnestLayer() const {
+  double thinnest = std::numeric_limits<double>::infinity();
+  std::vector<double> heights(std::min(kFacesAtOnce, map_.nodes)), next(heights.size());
+  readHeights(0, 0, heights);
+  for (uint64_t level = 1; level < levels(); ++level) {
+    readHeights(level, 0, next);
+    double sum = 0, count = 0;
+    for (size_t n = 0; n < next.size(); ++n) {
+      const double thickness = std::abs(next[n] - heights[n]);
+      if (!(thickness > 0)) continue;  // below the ground
+      sum += thickness;
+      ++count;
+    }
+    if (count > 0) thinnest = std::min(thinnest, sum / count);
+    heights.swap(next);
+  }
+  return std::isfinite(thinnest) ? thinnest : 0.0;
+}
+
+void ColumnsSource::noteSagitta() {
+  // Cells of more are smaller than 20 km, unless the mesh is very uneven, and lie less than 10 m below the sphere.
+  constexpr uint64_t kMaxNodes = 1 << 21;
+  if (!globe_.sphere() || map_.nodes > kMaxNodes) return;
+  const std::vector<double> longitude = readAngles(*map_.longitude, 0, map_.nodes);
+  const std::vector<double> latitude = readAngles(*map_.latitude, 0, map_.nodes);
+  double deepest = 0;  // in radii
+  forEachFace([&](uint64_t, std::span<const int64_t> nodes) {
+    glm::dvec3 sum(0.0);
+    double count = 0;
+    for (const int64_t node : nodes) {
+      if (node < 0) continue;
+      sum += globe_.column(longitude[static_cast<size_t>(node)], latitude[static_cast<size_t>(node)]);
+      ++count;
+    }
+    if (const double depth = 1 - glm::length(sum) / count; depth > deepest) deepest = depth;
+  });
+  const double sagitta = globe_.radius_km * deepest, thickness = globe_.vertical_scale * thinnestLayer();
+  if (!(thickness > 0 && 2 * sagitta > thickness)) return;
+  description_.warnings.push_back(
+      fmt::format("cells are flat, and their middles lie up to {:.3g} km below the sphere, {:.3g} times the "
+                  "thickness of the "
+                  "thinnest layer: there splats of one layer lie among those of others, and values mix; "
+                  "--flat keeps layers apart",
+                  sagitta, sagitta / thickness));
+}
+
 std::vector<double> ColumnsSource::readAngles(const NetcdfVariable& variable, uint64_t first,
                                               uint64_t count) const {
   std::vector<double> values(count);
@@ -237,10 +324,7 @@ void ColumnsSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::sp
     std::vector<double> heights(part.columns * part.layers);
     for (uint64_t layer = 0; layer < part.layers; ++layer) {
       const auto row = std::span(heights).subspan(layer * part.columns, part.columns);
-      if (heights_.levels.empty())
-        node_heights_.read((part.layer + layer) * map_.nodes + part.across, row);
-      else
-        std::fill(row.begin(), row.end(), heights_.levels[part.layer + layer]);
+      readHeights(part.layer + layer, part.across, row);
     }
     std::vector<double> layers;
     if (values_at_nodes) layers = layersOf(part.across, part.columns);
@@ -267,6 +351,9 @@ void ColumnsSource::readCells(uint32_t, uint64_t first, uint64_t count, std::spa
     const std::vector<int64_t> nodes = nodesOf(part.across, part.columns);
     std::vector<double> with_data(part.columns, std::numeric_limits<double>::infinity());
     if (scalars_.centring == Centring::kCell) with_data = layersOf(part.across, part.columns);
+    for (auto cut = std::lower_bound(cut_faces_.begin(), cut_faces_.end(), part.across);
+         cut != cut_faces_.end() && *cut < part.across + part.columns; ++cut)
+      with_data[*cut - part.across] = 0;
     for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n) {
       const uint64_t column = n / part.layers, layer = part.layer + n % part.layers;
       points.clear();

@@ -4,6 +4,8 @@
 
 #include <memory>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "preprocess/formats/columns/columns_heights.h"
 #include "preprocess/formats/columns/columns_layout.h"
@@ -42,6 +44,16 @@ class ColumnsSource final : public MeshSource {
   void describe(const OpenGridOptions& options);
   void findTimes(const OpenGridOptions& options);
   void spoolHeights(const std::filesystem::path& folder);
+  template <typename Use>
+  void forEachFace(const Use& use) const;
+  /// Finds the faces that a flat map is cut through.
+  void findCutFaces();
+  /// Notes how far flat prisms lie below the sphere, where layers are thinner than that.
+  void noteSagitta();
+  /// The mean thickness of the thinnest layer over the first nodes, in kilometres; 0 if there is none.
+  double thinnestLayer() const;
+  /// The heights of some nodes in a level, in kilometres.
+  void readHeights(uint64_t level, uint64_t first, std::span<double> out) const;
   void readScalars(uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                    std::vector<std::vector<float>>& out) const;
   std::vector<double> readAngles(const NetcdfVariable& variable, uint64_t first, uint64_t count) const;
@@ -61,6 +73,7 @@ class ColumnsSource final : public MeshSource {
   Globe globe_;
   SpooledNumbers node_heights_;  // [level][node], if heights_.levels is empty
   ColumnsBottom bottom_;
+  std::vector<uint64_t> cut_faces_;  // ascending
 };
 
 }  // namespace curvisplat
