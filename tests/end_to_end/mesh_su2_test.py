@@ -36,9 +36,10 @@ class Su2Meshes(MeshFormats):
                     out.write(" ".join(map(repr, point)) + (f" {n}\n" if numbered else "\n"))
                 out.write("NMARK= 2\nMARKER_TAG= lower\nMARKER_ELEMS= 1\n9 0 1 6 5\nMARKER_TAG= upper\nMARKER_ELEMS= 1\n9 1 2 7 6\n")
 
-    def write_restart(self, mesh, how, order="<"):
-        names = ["x", "y", "z", "p", "Momentum_x"]
-        table = np.column_stack([mesh.points, mesh.p, 2 * mesh.p])
+    def write_restart(self, mesh, how, order="<", variables=("p", "Momentum_x"), copies=1):
+        names = ["x", "y", "z", *variables]
+        table = np.column_stack([mesh.points] + [(n + 1) * mesh.p for n in range(len(variables))])
+        table = np.concatenate([table + np.array([0, 0, 0] + [10 * n] * len(variables)) for n in range(copies)])
         if how == "binary":
             head = np.array([535532, len(names), len(table), 1, 8], order + "i4").tobytes()
             text = b"".join(name.encode().ljust(33, b"\0") for name in names)
@@ -108,6 +109,51 @@ class Su2Meshes(MeshFormats):
         result = self.run_program("convert", self.path, *numbered, "-o", self.folder / "steps.splats", "--scalar", "p")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("2 steps, 2 of them converted now, 0 with a geometry of their own", result.stdout)
+
+    def test_zones_behind_the_dimension(self):
+        mesh = Mesh()
+        self.write(mesh, zones=2)
+        self.path.write_text("NDIME= 3\n" + self.path.read_text())
+        self.write_restart(mesh, "binary")
+        numbered = [self.folder / "restart_0.dat", self.folder / "restart_1.dat"]
+        for path in numbered:
+            path.write_bytes(self.restart.read_bytes())
+        self.assertEqual(self.info(self.path, *numbered)["cells"]["count"], len(mesh.cells))
+        self.assertAlmostEqual(self.volume([self.path, *numbered], "p"), 1, delta=2e-3)
+
+    def test_zones_of_different_variables(self):
+        mesh = Mesh()
+        self.write(mesh, zones=2)
+        files = [self.folder / "restart_0.dat", self.folder / "restart_1.dat"]
+        for path, variables in zip(files, (("Pressure", "T"), ("T", "Density"))):
+            self.write_restart(mesh, "binary", variables=variables)
+            self.restart.rename(path)
+        info = self.info(self.path, *files)
+        self.assertEqual([s["name"] for s in info["scalars"]], ["T"])
+        self.assertAlmostEqual(info["scalars"][0]["max"], 2 * mesh.p.max(), places=5)
+        self.assertIn("left out: Pressure, Density: not in all of the zones", "".join(info["warnings"]))
+        self.write_restart(mesh, "csv", variables=["Density"])
+        self.assertIn("left out: T: not in all of the zones", "".join(self.info(self.path, files[1], self.restart)["warnings"]))
+        self.write_restart(mesh, "csv", variables=["Pressure"])
+        self.expect_line(self.path, files[1], self.restart, words="share no variable (found T, Density, Pressure)")
+
+    def test_one_restart_of_several_zones(self):
+        mesh = Mesh()
+        self.write(mesh, zones=2)
+        for how in ("csv", "dat", "binary"):  # the points of both zones
+            self.write_restart(mesh, how, copies=2)
+            info = self.info(self.path, self.restart)
+            self.assertEqual(info["cells"]["count"], len(mesh.cells))
+            self.assertAlmostEqual(info["scalars"][0]["max"], mesh.p.max() + 10, places=5)
+        text = self.path.read_text().split("IZONE= 2")
+        small = Mesh(2)
+        self.write(small)
+        self.path.write_text(text[0] + "IZONE= 2\n" + self.path.read_text())
+        self.write_restart(small, "binary")  # those of the second alone
+        info = self.info(self.path, self.restart)
+        self.assertEqual(info["cells"]["count"], len(small.cells))
+        self.assertIn("left out: zone 1 (", "".join(info["warnings"]))
+        self.assertAlmostEqual(self.volume([self.path, self.restart], "p"), 1, delta=2e-3)
 
     @unittest.skipUnless(meshio, "no python3-meshio")
     def test_meshio_agrees(self):

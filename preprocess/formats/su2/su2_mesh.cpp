@@ -192,12 +192,17 @@ void MeshParser::endZone() {
 
 std::vector<Su2Zone> MeshParser::run() {
   while (nextLine()) {
+    if (valueOf("NZONE")) {
+      writer_.reset();
+      continue;
+    }
     if (valueOf("IZONE")) {
       endZone();
       continue;
     }
     if (const auto value = valueOf("NDIME")) {
-      if (writer_) endZone();
+      // A file of several zones may have NDIME before NZONE, too.
+      if (writer_ && writer_->points() + writer_->cells() > 0) endZone();
       if (count(*value) != 3)
         throw Error("{}: is a mesh of {} dimensions (NDIME); expected 3", text_.file().name(), count(*value));
       writer_.emplace(spools_);

@@ -182,18 +182,20 @@ void Su2Restart::read(size_t variable, uint64_t first, std::span<float> to) cons
 
 constexpr uint64_t kLooked = 4096;
 
-/// The first line that is neither empty nor a comment, without the white space around it; empty if the
-/// beginning has none.
-std::string firstLineOf(const InputFile& file) {
+/// The first two lines that are neither empty nor comments, without the white space around them; empty
+/// where the beginning has none.
+std::array<std::string, 2> firstLinesOf(const InputFile& file) {
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
   file.readAt(0, std::span(begin.data(), begin.size()));
-  for (size_t at = 0; at < begin.size();) {
+  std::array<std::string, 2> lines;
+  size_t found = 0;
+  for (size_t at = 0; at < begin.size() && found < lines.size();) {
     const size_t end = std::min(begin.find('\n', at), begin.size());
     const std::string_view line = trimmed(std::string_view(begin).substr(at, end - at));
     at = end + 1;
-    if (!line.empty() && line[0] != '%') return std::string(line);
+    if (!line.empty() && line[0] != '%') lines[found++] = line;
   }
-  return "";
+  return lines;
 }
 
 /// The text after "KEY =" in the line; nullopt if it has another key.
@@ -204,15 +206,36 @@ std::optional<std::string_view> valueOf(std::string_view line, std::string_view 
   return trimmed(line.substr(1));
 }
 
+/// How many points a restart file has: as its head says, or as many lines as have as many fields as the first.
+uint64_t pointsOf(const std::shared_ptr<const PooledFile>& file) {
+  std::array<std::byte, kHeadBytes> head{};
+  if (file->size() >= head.size()) file->readAt(0, head);
+  for (const bool swap : {false, true})
+    if (loadStored<int32_t>(head.data(), swap) == kMagic)
+      return static_cast<uint64_t>(std::max(loadStored<int32_t>(head.data() + 8, swap), 0));
+  TextReader text(file, 0, file->size());
+  const auto header = text.line();
+  const size_t fields = header ? fieldsOf(*header).size() : 0;
+  uint64_t points = 0;
+  for (auto line = text.line(); line && fieldsOf(*line).size() == fields; line = text.line()) ++points;
+  return points;
+}
+
 class Su2Source final : public ElementSource {
  public:
   explicit Su2Source(const OpenGridOptions& options);
 
  private:
-  /// The restart file and its variable for each piece.
-  using Variable = std::vector<std::pair<size_t, size_t>>;
+  /// Names the place of a piece's values.
+  struct Place {
+    size_t file = 0, variable = 0;
+    uint64_t first = 0;  // the number of the piece's first point in the file
+  };
 
-  void openRestarts(const OpenGridOptions& options);
+  void chooseZones(const OpenGridOptions& options, const std::shared_ptr<OpenFiles>& pool);
+  void openRestarts(const OpenGridOptions& options, const std::shared_ptr<OpenFiles>& pool);
+  void addVariables(size_t file, ScalarList& list);
+  void addSharedVariables(ScalarList& list);
   void readPlaces(uint32_t piece, uint64_t first, uint64_t count, const Places& to) const override {
     zones_.at(piece).mesh.readPoints(first, count, to);
   }
@@ -220,13 +243,14 @@ class Su2Source final : public ElementSource {
     zones_.at(piece).mesh.appendCells(first, count, out);
   }
   void readValues(uint32_t piece, uint32_t scalar, uint64_t first, std::span<float> to) const override {
-    const auto [file, variable] = variables_.at(scalar).at(piece);
-    restarts_[file].read(variable, first, to);
+    const Place& place = variables_.at(scalar).at(piece);
+    restarts_[place.file].read(place.variable, place.first + first, to);
   }
 
   std::vector<Su2Zone> zones_;
+  std::vector<size_t> numbers_;  // of zones_ in the file, from 1
   std::vector<Su2Restart> restarts_;
-  std::vector<Variable> variables_;  // [description_.scalars]
+  std::vector<std::vector<Place>> variables_;  // [description_.scalars][zones_]
 };
 
 Su2Source::Su2Source(const OpenGridOptions& options) {
@@ -236,59 +260,126 @@ Su2Source::Su2Source(const OpenGridOptions& options) {
   description_.files.push_back(file->name());
   description_.coordinate_bytes = 8;
   description_.format = fmt::format("SU2 mesh, {}", countText(zones_.size(), "zone"));
+  for (size_t n = 1; n <= zones_.size(); ++n) numbers_.push_back(n);
+  chooseZones(options, pool);
   std::vector<std::string> markers;
   for (size_t n = 0; n < zones_.size(); ++n) {
     const SpooledMesh& mesh = zones_[n].mesh;
-    description_.pieces.push_back({fmt::format("zone {}", n + 1), file->name(), mesh.points(), mesh.cells()});
+    description_.pieces.push_back(
+        {fmt::format("zone {}", numbers_[n]), file->name(), mesh.points(), mesh.cells()});
     markers.insert(markers.end(), zones_[n].markers.begin(), zones_[n].markers.end());
   }
   if (!markers.empty()) description_.notes.push_back("boundaries: " + listed(markers));
-  openRestarts(options);
+  openRestarts(options, pool);
 }
 
-void Su2Source::openRestarts(const OpenGridOptions& options) {
+/// Keeps the one zone whose points a single restart file has, unless it has those of all zones.
+void Su2Source::chooseZones(const OpenGridOptions& options, const std::shared_ptr<OpenFiles>& pool) {
+  if (zones_.size() == 1 || options.solutions.size() != 1) return;
+  const uint64_t points = pointsOf(std::make_shared<const PooledFile>(pool, options.solutions.front()));
+  uint64_t all = 0;
+  std::vector<size_t> fitting;
+  std::vector<std::string> others;
+  for (size_t n = 0; n < zones_.size(); ++n) {
+    const uint64_t of_zone = zones_[n].mesh.points();
+    all += of_zone;
+    if (of_zone == points)
+      fitting.push_back(n);
+    else
+      others.push_back(fmt::format("zone {} ({})", n + 1, countText(of_zone, "point")));
+  }
+  if (points == all) return;
+  if (fitting.size() != 1)
+    throw Error(
+        "{}: has {} zones, but 1 restart files are given, with {}, which is neither that of one zone alone "
+        "nor "
+        "of all ({}); give one for each zone, in their order",
+        options.grid.string(), zones_.size(), countText(points, "point"), all);
+  description_.warnings.push_back(fmt::format("left out: {}: {} has the points of zone {} alone",
+                                              listed(others), options.solutions.front().string(),
+                                              fitting[0] + 1));
+  zones_ = {std::move(zones_[fitting[0]])};
+  numbers_ = {fitting[0] + 1};
+}
+
+void Su2Source::openRestarts(const OpenGridOptions& options, const std::shared_ptr<OpenFiles>& pool) {
   const std::vector<std::filesystem::path>& files = options.solutions;
   if (files.empty()) return;
-  if (zones_.size() > 1 && files.size() != zones_.size())
+  const bool several = zones_.size() > 1 && files.size() > 1;
+  if (several && files.size() != zones_.size())
     throw Error("{}: has {} zones, but {} restart files are given; give one for each, in their order",
                 options.grid.string(), zones_.size(), files.size());
-  const auto pool = std::make_shared<OpenFiles>();
+  uint64_t all = 0;
+  for (const Su2Zone& zone : zones_) all += zone.mesh.points();
   const auto spool = std::make_shared<SpoolFile>(options.temporary_folder);
   ScalarList list(description_);
   for (size_t n = 0; n < files.size(); ++n) {
-    const size_t piece = zones_.size() > 1 ? n : 0;
-    restarts_.emplace_back(std::make_shared<const PooledFile>(pool, files[n]), zones_[piece].mesh.points(),
-                           spool);
+    restarts_.emplace_back(std::make_shared<const PooledFile>(pool, files[n]),
+                           several ? zones_[n].mesh.points() : all, spool);
     description_.files.push_back(files[n].string());
-    if (zones_.size() > 1)
+    if (several)
       description_.notes.push_back(fmt::format("zone {} has the values of {}", n + 1, files[n].string()));
-    const std::vector<std::string>& names = restarts_.back().names();
-    if (piece > 0 && names != restarts_.front().names())
-      throw Error("{}: has other variables than {}; expected the same", files[n].string(), files[0].string());
-    for (size_t v = 0; v < names.size(); ++v) {
-      if (piece > 0) {
-        variables_[v].emplace_back(n, v);
-        continue;
-      }
-      list.add({names[v], fmt::format("{}:{}", names[v], n + 1)}, Centring::kNode);
-      variables_.push_back({{n, v}});
+    else
+      addVariables(n, list);
+  }
+  if (several) addSharedVariables(list);
+  description_.format += restarts_.front().binary() ? " + binary restart" : " + ASCII restart";
+}
+
+/// Adds the variables of a file that has the points of all zones.
+void Su2Source::addVariables(size_t file, ScalarList& list) {
+  const std::vector<std::string>& names = restarts_[file].names();
+  for (size_t v = 0; v < names.size(); ++v) {
+    list.add({names[v], fmt::format("{}:{}", names[v], file + 1)}, Centring::kNode);
+    std::vector<Place>& places = variables_.emplace_back();
+    uint64_t first = 0;
+    for (const Su2Zone& zone : zones_) {
+      places.push_back({file, v, first});
+      first += zone.mesh.points();
     }
   }
-  description_.format += restarts_.front().binary() ? " + binary restart" : " + ASCII restart";
+}
+
+/// Adds the variables that the files of all zones have, and warns of the others.
+void Su2Source::addSharedVariables(ScalarList& list) {
+  std::vector<std::string> seen, partial;
+  for (const Su2Restart& restart : restarts_)
+    for (const std::string& name : restart.names()) {
+      if (std::find(seen.begin(), seen.end(), name) != seen.end()) continue;
+      seen.push_back(name);
+      std::vector<Place> places;
+      for (size_t n = 0; n < restarts_.size(); ++n) {
+        const std::vector<std::string>& names = restarts_[n].names();
+        const auto found = std::find(names.begin(), names.end(), name);
+        if (found != names.end()) places.push_back({n, static_cast<size_t>(found - names.begin()), 0});
+      }
+      if (places.size() < restarts_.size()) {
+        partial.push_back(name);
+        continue;
+      }
+      list.add({name}, Centring::kNode);
+      variables_.push_back(std::move(places));
+    }
+  if (variables_.empty())
+    throw Error("{}: its zones share no variable (found {}); give the restart file of one zone alone",
+                description_.files.front(), listed(partial));
+  if (!partial.empty())
+    description_.warnings.push_back(fmt::format(
+        "left out: {}: not in all of the zones; give the restart file of one zone alone", listed(partial)));
 }
 
 }  // namespace
 
 bool isSu2(const InputFile& file) {
-  const std::string line = firstLineOf(file);
+  const std::string line = firstLinesOf(file)[0];
   return valueOf(line, "NDIME") || valueOf(line, "NZONE");
 }
 
 uint64_t su2Zones(const InputFile& file) {
-  const std::string line = firstLineOf(file);
-  const auto value = valueOf(line, "NZONE");
   uint64_t zones = 1;
-  if (value) std::from_chars(value->data(), value->data() + value->size(), zones);
+  for (const std::string& line : firstLinesOf(file))
+    if (const auto value = valueOf(line, "NZONE"))
+      std::from_chars(value->data(), value->data() + value->size(), zones);
   return zones;
 }
 

@@ -13,10 +13,11 @@ namespace curvisplat {
 
 /// Whether the text begins with one of SU2's keys.
 bool isSu2(const InputFile& file);
-/// The number of zones of such a file, as its first key says: 1 without NZONE.
+/// The number of zones of such a file, as its first two keys say: 1 without NZONE.
 uint64_t su2Zones(const InputFile& file);
 
-/// Zones are pieces. options.solutions: restart files of the one zone, or one for each zone, in their order. Throws Error.
+/// Zones are pieces. options.solutions: restart files of the one zone; one for each zone, in their order, of which the variables
+/// that all have are read; or one for all zones, whose points follow one another, or for one of them. Throws Error.
 std::unique_ptr<DataSource> openSu2(const OpenGridOptions& options);
 
 }  // namespace curvisplat
