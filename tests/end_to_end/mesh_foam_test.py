@@ -235,6 +235,17 @@ class MeshFoam(MeshCase):
             self.assertIn(f"{name} is left out", "".join(info["warnings"]))
         self.assertIn("foamDictionary -expand", "".join(info["warnings"]))
 
+    def test_a_field_of_another_mesh_is_left_out(self):
+        for binary in (False, True):
+            with self.subTest(binary=binary):
+                case, p, _ = self.foam_case(binary=binary)
+                FoamCase(case, binary=binary).write_field(case / "0", "a", p[:10])
+                info = self.info(case)
+                self.assertEqual(info["cells"]["polyhedra"], 64)
+                self.assertEqual([s["name"] for s in info["scalars"]], ["T", "U:mag", "U:x", "U:y", "U:z", "p"])
+                self.assertIn("a: has 10 values; expected 64, one for each cell; a is left out", "".join(info["warnings"]))
+                self.assertAlmostEqual(self.volume(case, "p"), 1, delta=2e-3)
+
     def test_scoped_macros_and_files_of_the_case(self):
         """As the tutorials' `uniform $:Uinf;`, `$dictionary.entry` and `#include "$FOAM_CASE/system/values"`."""
         case, _, _ = self.foam_case()

@@ -274,4 +274,8 @@ std::vector<double> FoamFile::beginField(size_t components) {
   return {};
 }
 
+uint64_t FoamFile::readCount() {
+  return parser_->label();
+}
+
 }  // namespace curvisplat

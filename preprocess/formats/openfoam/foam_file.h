@@ -56,6 +56,8 @@ class FoamFile {
   /// Goes to the values of a field. Returns the numbers of a uniform one, and none of a list. Throws Error if only
   /// OpenFOAM could evaluate them (#codeStream, #calc).
   std::vector<double> beginField(size_t components);
+  /// Reads how many tuples the list has that comes next; of such a file no more can be read.
+  uint64_t readCount();
 
  private:
   struct Parser;

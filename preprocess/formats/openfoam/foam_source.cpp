@@ -88,6 +88,12 @@ class FoamSource final : public ElementSource {
   std::map<std::string, std::vector<std::filesystem::path>> filesAt(const std::string& time) const;
   void findFields();
   void warnOfLaterFields();
+  void requireOneForEachCell(const FoamFile& file, const std::filesystem::path& path, uint64_t count) const;
+  std::filesystem::path valuesFolderOf(const Piece& piece) const {
+    // Without a region the path has no slash at its end.
+    const std::filesystem::path folder = piece.folder / time_names_[description_.time_step];
+    return piece.region.empty() ? folder : folder / piece.region;
+  }
   void addField(const std::string& name, size_t components);
   const FoamList& valuesOf(uint32_t piece, size_t field, std::vector<double>& uniform) const;
 
@@ -270,9 +276,10 @@ void FoamSource::findFields() {
     }
     const size_t components = componentsOf(file->type());
     if (components == 0) continue;
-    // Initial values may be expressions. Such a field is left out, and the others are read.
+    // Initial values may be expressions, and a field may be that of another mesh. Such a field is left out, and the others are read.
     try {
-      file->beginField(components);
+      const bool uniform = !file->beginField(components).empty();
+      if (!uniform) requireOneForEachCell(*file, path, file->readCount());
     } catch (const Error& error) {
       description_.warnings.push_back(fmt::format("{}; {} is left out", error.what(), name));
       continue;
@@ -287,6 +294,16 @@ void FoamSource::findFields() {
                                                   regions - paths.size(), regions, name));
   }
   warnOfLaterFields();
+}
+
+/// Throws unless the file, one of the regions' files of the first processor, has `count` cells' values.
+void FoamSource::requireOneForEachCell(const FoamFile& file, const fs::path& path, uint64_t count) const {
+  for (const Piece& piece : pieces_) {
+    const bool first = piece.folder == pieces_.front().folder && piece.processor == pieces_.front().processor;
+    if (!first || path.parent_path() != valuesFolderOf(piece)) continue;
+    if (count != piece.cells.cells)
+      throw Error("{}: has {} values; expected {}, one for each cell", file.name(), count, piece.cells.cells);
+  }
 }
 
 /// Names the fields that are read at a later time alone: those that a run writes besides (yPlus, UMean), and those that the first time
@@ -328,8 +345,7 @@ const FoamList& FoamSource::valuesOf(uint32_t piece_number, size_t field,
   Values& values = values_[piece_number][field];
   if (!values.read) {
     const Piece& piece = pieces_[piece_number];
-    const fs::path path =
-        piece.folder / time_names_[description_.time_step] / piece.region / fields_[field].name;
+    const fs::path path = valuesFolderOf(piece) / fields_[field].name;
     if (!piece.region.empty() && !FoamFile::exists(path)) {  // another region's
       values.uniform.assign(fields_[field].components, std::numeric_limits<double>::quiet_NaN());
       values.read = true;
