@@ -94,6 +94,17 @@ void forEachIn(const Sections& sections, uint64_t first, uint64_t count, const U
   }
 }
 
+/// Calls use(row, number) for each number of a section of one column.
+template <typename Use>
+void forEachNumber(const Section& section, const Use& use) {
+  std::vector<double> some;
+  for (uint64_t n = 0; n < section.count; n += some.size()) {
+    some.resize(std::min(kAtOnce, section.count - n));
+    section.array->read(n, some);
+    for (size_t k = 0; k < some.size(); ++k) use(n + k, some[k]);
+  }
+}
+
 uint64_t componentsOf(const Section& section) {
   return section.count == 0 ? 1 : section.array->size() / section.count;
 }
@@ -133,9 +144,10 @@ class FluentSource final : public ElementSource {
   const Hdf5Contents file_;
   std::optional<Hdf5Contents> data_;
   ListSpools spools_;
-  uint64_t points_ = 0, faces_ = 0, cells_ = 0, corners_ = 0;
-  Sections coordinates_, corner_lists_, sides_;  // the second: of corners, all faces' one after another
-  SpooledNumbers begins_;                        // of each face, and the end of the last
+  uint64_t points_ = 0, faces_ = 0, cells_ = 0;
+  Sections coordinates_, sides_;
+  SpooledNumbers begins_;   // of each face, and the end of the last
+  SpooledNumbers corners_;  // of all faces, one after another
   CellFaces cell_faces_;
   std::vector<Range> parents_;  // cells that are divided
   std::vector<Sections> fields_;
@@ -181,7 +193,8 @@ FluentSource::FluentSource(const OpenGridOptions& options)
   if (!data.empty()) openData(data);
 }
 
-/// Finds the corners of the faces, and spools where each face begins.
+/// Spools the corners of the faces, and where each face begins: each pass over the cells reads corners in many
+/// pieces, and HDF5 would unpack a whole chunk for each of them.
 void FluentSource::openFaces() {
   const std::string group = at("/faces/nodes");
   std::vector<std::pair<Range, std::string>> sections;
@@ -190,36 +203,34 @@ void FluentSource::openFaces() {
       sections.emplace_back(rangeOf(file_, place), place);
   std::sort(sections.begin(), sections.end(),
             [](const auto& a, const auto& b) { return a.first.first < b.first.first; });
-  NumberSpool<uint64_t> begins(spools_.begins);
-  uint64_t next = 0;
-  for (const auto& [range, place] : sections) {
+  NumberSpool<uint64_t> begins(spools_.begins), all_corners(spools_.items);
+  uint64_t next = 0, corners = 0;
+  for (const auto& section : sections) {
+    const Range& range = section.first;
+    const std::string& place = section.second;
     if (range.first != next)
       file_.fail(place, fmt::format("begins with face {}; expected {}; the file is damaged", range.first + 1,
                                     next + 1));
     next = range.end;
     const Section counts = sectionOf(file_, place + "/nnodes", range);
-    const uint64_t before = corners_;
-    std::vector<double> some(std::min(kAtOnce, counts.count));
-    for (uint64_t n = 0; n < counts.count; n += some.size()) {
-      some.resize(std::min(kAtOnce, counts.count - n));
-      counts.array->read(n, some);
-      for (const double count : some) {
-        if (!(count >= 0 && count <= kMaxNumber))
-          file_.fail(place + "/nnodes", fmt::format("has {}; expected a count", count));
-        begins.add(corners_);
-        corners_ += static_cast<uint64_t>(count);
-      }
-    }
-    Section corners{file_.required(place + "/nodes"), before, corners_ - before};
-    if (corners.array->size() != corners.count)
+    const uint64_t before = corners;
+    forEachNumber(counts, [&](uint64_t, double count) {
+      if (!(count >= 0 && count <= kMaxNumber))
+        file_.fail(place + "/nnodes", fmt::format("has {}; expected a count", count));
+      begins.add(corners);
+      corners += static_cast<uint64_t>(count);
+    });
+    const Section list{file_.required(place + "/nodes"), before, corners - before};
+    if (list.array->size() != list.count)
       file_.fail(place + "/nodes", fmt::format("has {} nodes; expected {}; the file is damaged",
-                                               corners.array->size(), corners.count));
-    corner_lists_.push_back(std::move(corners));
+                                               list.array->size(), list.count));
+    forEachNumber(list, [&](uint64_t, double point) { all_corners.add(pointNumber(point, 1)); });
   }
   if (next != faces_)
     file_.fail(group, fmt::format("has {} faces; expected {}; the file is damaged", next, faces_));
-  begins.add(corners_);
+  begins.add(corners);
   begins_ = begins.finish();
+  corners_ = all_corners.finish();
 }
 
 /// The numbers of faces or of cells that adaption has divided into others.
@@ -257,22 +268,17 @@ void FluentSource::sortFaces() {
   cell_faces_ = sortFacesByCell(
       cells_,
       [&](const auto& use) {
-        std::vector<double> some;
         for (const Section& section : sides_)
-          for (uint64_t n = 0; n < section.count; n += some.size()) {
-            some.resize(std::min(kAtOnce, section.count - n));
-            section.array->read(n, some);
-            for (size_t k = 0; k < some.size(); ++k) {
-              const uint64_t face = section.first + n + k;
-              if (some[k] == 0) continue;  // outside
-              if (!(some[k] >= 1 && some[k] <= static_cast<double>(cells_)) || face >= faces_)
-                throw Error("{}: face {} belongs to cell {}; expected up to {}; the file is damaged",
-                            section.array->where(), face + 1, some[k], cells_);
-              const auto has = [&](const Range& range) { return range.has(face); };
-              if (std::none_of(left_out.begin(), left_out.end(), has))
-                use(face, static_cast<uint64_t>(some[k]) - 1);
-            }
-          }
+          forEachNumber(section, [&](uint64_t row, double cell) {
+            const uint64_t face = section.first + row;
+            if (cell == 0) return;  // outside
+            if (!(cell >= 1 && cell <= static_cast<double>(cells_)) || face >= faces_)
+              throw Error("{}: face {} belongs to cell {}; expected up to {}; the file is damaged",
+                          section.array->where(), face + 1, cell, cells_);
+            const auto has = [&](const Range& range) { return range.has(face); };
+            if (std::none_of(left_out.begin(), left_out.end(), has))
+              use(face, static_cast<uint64_t>(cell) - 1);
+          });
       },
       spools_);
 }
@@ -370,17 +376,8 @@ void FluentSource::appendCells(uint32_t, uint64_t first, uint64_t count, MeshCel
   std::vector<uint64_t> faces(begins.back() - begins.front());
   cell_faces_.faces.read(begins.front(), std::span(faces));
   const FaceLists lists{[&](uint64_t from, std::span<uint64_t> to) { begins_.read(from, to); },
-                        [&](uint64_t from, std::span<uint64_t> to) {
-                          std::vector<double> some;
-                          forEachIn(corner_lists_, from, to.size(),
-                                    [&](const Section& section, uint64_t row, uint64_t rows, uint64_t place) {
-                                      some.resize(rows);
-                                      section.array->read(row, some);
-                                      for (size_t n = 0; n < rows; ++n)
-                                        to[place + n] = pointNumber(some[n], 1);
-                                    });
-                        },
-                        faces_, corners_};
+                        [&](uint64_t from, std::span<uint64_t> to) { corners_.read(from, to); }, faces_,
+                        corners_.count};
   // Divided cells have no faces of their own, and are cells of no kind; the cells between them are added in
   // runs.
   for (uint64_t n = 0; n < count;) {
