@@ -8,6 +8,7 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
 #include "render/colour/function_parts.h"
+#include "stream/base/component_name.h"
 
 namespace curvisplat {
 namespace {
@@ -58,13 +60,25 @@ bool isNumbering(const VariableInfo& variable) {
   return std::find(std::begin(kNames), std::end(kNames), variable.name) != std::end(kNames);
 }
 
+/// Whether the component varies by no more than rounding errors of the vector's or tensor's largest component.
+bool isNoise(const VariableInfo& component, std::span<const VariableInfo> variables) {
+  constexpr double kRounding = 1e-6;
+  const std::string_view vector = vectorOf(component.name);
+  double largest = 0;
+  for (const VariableInfo& other : variables)
+    if (!vector.empty() && vectorOf(other.name) == vector)
+      largest = std::max({largest, std::abs(other.min), std::abs(other.max)});
+  return component.max - component.min < kRounding * largest;
+}
+
 }  // namespace
 
 size_t firstVaryingVariable(const Manifest& manifest) {
   std::optional<size_t> first;
   for (size_t n = 0; n < manifest.variables.size(); ++n) {
-    if (isNearlyConstant(manifest.variables[n])) continue;
-    if (!isNumbering(manifest.variables[n])) return n;
+    const VariableInfo& variable = manifest.variables[n];
+    if (isNearlyConstant(variable)) continue;
+    if (!isNumbering(variable) && !isNoise(variable, manifest.variables)) return n;
     if (!first) first = n;
   }
   return first.value_or(0);

@@ -20,8 +20,8 @@ namespace curvisplat {
 
 /// Whether the values differ by so little that only their noise could be drawn: 1e-4 of the largest.
 bool isNearlyConstant(const VariableInfo& variable);
-/// The position of the first variable that is not nearly constant, numbers of points and cells last; 0 if all
-/// are. Requires one or more.
+/// The position of the first variable that is not nearly constant; numbers of points and cells, and components of
+/// vectors that vary by rounding errors alone, come last; 0 if all are nearly constant. Requires one or more.
 size_t firstVaryingVariable(const Manifest& manifest);
 
 class FirstChoice {

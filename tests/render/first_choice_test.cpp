@@ -222,6 +222,19 @@ TEST(FirstChoice, ConstantScalarsAreRecognised) {
   EXPECT_EQ(firstVaryingVariable(manifest), 0u);
 }
 
+TEST(FirstChoice, RoundingErrorsOfAVectorAreNotDrawn) {
+  Manifest manifest;
+  manifest.variables = {{0, "Taus:0", "", -1e-19, 1e-18},
+                        {1, "VelocityZ", "", -4.7e-14, 4.1e-14},
+                        {2, "Taus:4", "", -9e-5, 2e-4},
+                        {3, "Velocity:mag", "", 800, 2200}};
+  EXPECT_EQ(firstVaryingVariable(manifest), 2u);
+  manifest.variables.erase(manifest.variables.begin() + 2);  // small, but nothing says that it is noise
+  EXPECT_EQ(firstVaryingVariable(manifest), 0u);
+  manifest.variables.erase(manifest.variables.begin());
+  EXPECT_EQ(firstVaryingVariable(manifest), 1u);
+}
+
 TEST(FirstChoice, NumbersOfPointsAreTheLastScalarToDraw) {
   Manifest manifest;
   manifest.variables = {{0, "GlobalNodeId", "", 1, 6724}, {1, "ObjectId", "", 1, 2}, {2, "EQPS", "", 0, 3}};
