@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stream/base/error.h"
+#include "stream/model/border_code.h"
 #include "stream/model/kernel.h"
 
 namespace curvisplat {
@@ -25,10 +26,28 @@ glm::dvec3 inFootprint(const SplatGeometry& g, size_t s, const glm::dvec3& d) {
   return {b0 / g.axis0[s], b1 / g.axis1[s], b2 / g.axis2[s]};
 }
 
+/// Whether a point at `offset` from a splat's centre, in its footprint, is beyond the border where the splat's cell ends. Cells are not
+/// quite what the code says, so a point within a tenth of the cell beyond it counts as inside.
+bool isBeyondBorder(uint32_t border_code, const glm::dvec3& offset) {
+  constexpr double kTolerance = 0.1;
+  if (border_code == kNoBorder) return false;
+  const InwardAxes inward = inwardAxes(border_code);
+  for (int n = 0; n < inward.count; ++n)
+    if (glm::dot(glm::dvec3(inward.axis[static_cast<size_t>(n)]), offset) < -inward.distance - kTolerance)
+      return true;
+  return false;
+}
+
+/// The nearest splat of a block.
+struct NearestOfBlock {
+  ReachingSample sample;
+  bool is_beyond = false;  // isBeyondBorder()
+};
+
 /// The facts about a point so far.
 struct Probed {
   std::optional<ProbeResult> nearest;
-  std::vector<ReachingSample> near;  // [block that has a splat there]
+  std::vector<NearestOfBlock> near;  // [block that has a splat there]
   double weights = 0;
   std::vector<double> values;  // [variable]: sums by weight
 };
@@ -69,13 +88,14 @@ void addSplat(const CacheReader& reader, const Leaf& leaf, uint32_t s, const glm
   const bool is_nearest = !probed.nearest || distance < probed.nearest->distance;
   ReachingSample sample = sampleOf(reader, leaf.runs, s);
   sample.distance = distance;
+  const bool is_beyond = isBeyondBorder(leaf.geometry.border_code[s], offset);
   const auto of_block =
       std::find_if(probed.near.begin(), probed.near.end(),
-                   [&](const ReachingSample& other) { return other.block == sample.block; });
+                   [&](const NearestOfBlock& other) { return other.sample.block == sample.block; });
   if (of_block == probed.near.end())
-    probed.near.push_back(sample);
-  else if (distance < of_block->distance)
-    *of_block = sample;
+    probed.near.push_back({sample, is_beyond});
+  else if (distance < of_block->sample.distance)
+    *of_block = {sample, is_beyond};
   if (is_nearest) {
     probed.nearest =
         ProbeResult{leaf.number, s, sample.block, sample.i, sample.j, sample.k, centre, distance, {}, {}};
@@ -88,6 +108,26 @@ void addSplat(const CacheReader& reader, const Leaf& leaf, uint32_t s, const glm
     probed.values[v] += weight * (values.mean[s] + glm::dot(slope, offset));
     if (is_nearest) probed.nearest->variables[v].mean = values.mean[s];
   }
+}
+
+/// The result from what is known of a point: nothing where it is beyond the borders of all blocks whose splats reach it.
+std::optional<ProbeResult> resultOf(const CacheReader& reader, std::span<const size_t> variables,
+                                    Probed&& probed) {
+  if (std::all_of(probed.near.begin(), probed.near.end(),
+                  [](const NearestOfBlock& block) { return block.is_beyond; }))
+    return std::nullopt;
+  ProbeResult result = std::move(*probed.nearest);
+  for (const NearestOfBlock& block : probed.near) result.near.push_back(block.sample);
+  std::sort(result.near.begin(), result.near.end(),
+            [](const ReachingSample& a, const ReachingSample& b) { return a.distance < b.distance; });
+  if (probed.weights == 0) return result;
+  for (size_t v = 0; v < variables.size(); ++v) {
+    // Slopes lead beyond the data's values where a splat's samples are on one side of the point.
+    const VariableInfo& variable = reader.manifest().variables[variables[v]];
+    result.variables[v].value = static_cast<float>(
+        std::clamp(probed.values[v] / probed.weights, variable.min, std::max(variable.min, variable.max)));
+  }
+  return result;
 }
 
 }  // namespace
@@ -123,15 +163,7 @@ std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader, std:
   }
   std::vector<std::optional<ProbeResult>> results;
   results.reserve(points.size());
-  for (Probed& of_point : probed) {
-    std::sort(of_point.near.begin(), of_point.near.end(),
-              [](const ReachingSample& a, const ReachingSample& b) { return a.distance < b.distance; });
-    if (of_point.nearest) of_point.nearest->near = std::move(of_point.near);
-    if (of_point.nearest && of_point.weights > 0)
-      for (size_t v = 0; v < variables.size(); ++v)
-        of_point.nearest->variables[v].value = static_cast<float>(of_point.values[v] / of_point.weights);
-    results.push_back(std::move(of_point.nearest));
-  }
+  for (Probed& of_point : probed) results.push_back(resultOf(reader, variables, std::move(of_point)));
   return results;
 }
 

@@ -100,6 +100,31 @@ TEST_F(InfoOfACache, ProbesAFileOfPoints) {
                 {"points.csv", "line 2"});
 }
 
+/// Nodes of a lattice, and x: a point that is more than a twentieth of a cell beyond a border is outside.
+TEST_F(InfoOfACache, EndsAtTheBordersOfTheGrid) {
+  std::string values;
+  for (int n = 0; n < 6 * 6 * 6; ++n) values += fmt::format("{}\n", n % 6);
+  overwriteFile(
+      folder_ / "x.vtk",
+      "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 6 6 6\nORIGIN 0 0 0\n"
+      "SPACING 1 1 1\nPOINT_DATA 216\nSCALARS f float 1\nLOOKUP_TABLE default\n" +
+          values);
+  run({"convert", folder_ / "x.vtk", "-o", folder_ / "x.splats", "--refine", "1"});
+  const auto statusAt = [&](double along, int axis) {
+    glm::dvec3 at(2.3, 1.6, 3.2);
+    at[axis] = along;
+    return runProgram({"info", folder_ / "x.splats", fmt::format("--probe={},{},{}", at.x, at.y, at.z)})
+        .status;
+  };
+  for (int axis = 0; axis < 3; ++axis)
+    for (const auto& [along, status] :
+         {std::pair(0.02, 0), {4.98, 0}, {-0.1, 1}, {5.1, 1}, {-0.3, 1}, {5.4, 1}})
+      EXPECT_EQ(statusAt(along, axis), status) << along << " along " << axis;
+  const auto probe =
+      nlohmann::json::parse(run({"info", folder_ / "x.splats", "--json", "--probe=-0.03,2,2"}).out)["probe"];
+  EXPECT_EQ(probe["values"][0]["value"], 0);
+}
+
 /// Nodes of a sheared, bent lattice, and a scalar that is linear in i, j and k: trilinear in the cells, exactly.
 TEST_F(InfoOfACache, ProbesTheFilesCells) {
   const auto place = [](double i, double j, double k) {
