@@ -349,7 +349,58 @@ class Messages(FormatCase):
         path = self.write("many.vtk", "# vtk DataFile Version 3.0\nmany\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
                           f"SPACING 1 1 1\nPOINT_DATA 8\nFIELD FieldData 1000\n{values}")
         printed = self.run_program("convert", path, "-o", self.folder / "many.splats").stderr
-        self.assertRegex(printed, "left out: v16, v17, .*, v55 and 944 more; choose scalars with --scalar NAME,NAME")
+        self.assertRegex(printed, "left out: v16, v17, .*, v55 and 944 more, beyond the 16 that are converted unasked; "
+                         "choose scalars with --scalar NAME,NAME")
+
+    def legacy_arrays(self, name, points, cells=()):
+        parts = [f"{part}_DATA {count}\nFIELD FieldData {len(names)}\n" + "".join(
+            f"{array} {components} {count} float\n" + " ".join(str(n) for n in range(components * count)) + "\n" for array, components in names)
+            for part, count, names in (("POINT", 8, points), ("CELL", 1, cells)) if names]
+        return self.write(name, "# vtk DataFile Version 3.0\nmany\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
+                          "SPACING 1 1 1\n" + "".join(parts))
+
+    def test_components_are_left_out_before_scalars(self):
+        path = self.legacy_arrays("tensor.vtk", [("B", 9), ("W", 3), ("k", 1), ("nut", 1), ("nuTilda", 1), ("p", 1)])
+        printed = self.run_program("convert", path, "-o", self.folder / "tensor.splats").stderr
+        self.assertIn("note: left out: B:8, beyond the 16 that are converted unasked; choose scalars with", printed)
+        names = [variable["name"] for variable in self.manifest(self.folder / "tensor.splats")["variables"]]
+        self.assertEqual(names, [f"B:{n}" for n in range(8)] + ["W:mag", "W:x", "W:y", "W:z", "k", "nut", "nuTilda", "p"])
+
+    def test_cells_that_are_not_drawn_are_counted(self):
+        path = self.write("t.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\n"
+                          "CELLS 3 13\n4 0 1 2 3\n3 0 1 2\n3 0 1 3\nCELL_TYPES 3\n10\n5\n5\nCELL_DATA 3\nSCALARS c float 1\nLOOKUP_TABLE default\n1 2 3\n")
+        self.assertIn("cells     3: 1 tetrahedron, 2 not solid or blanked by the file\n", self.run_program("info", path).stdout)
+        self.assertIn("2 samples are of cells that are not solid, or blanked by the file\n",
+                      self.run_program("convert", path, "-o", self.folder / "t.splats").stderr)
+
+    def rendered(self, path, *options):
+        cache = self.convert([path], "all")
+        return self.run_program("render", cache, "-o", self.folder / "a.png", "--size", "160x160", *options).stderr
+
+    def test_a_constant_scalar_gets_advice_that_can_be_followed(self):
+        head = "# vtk DataFile Version 3.0\nc\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+        arrays = "POINT_DATA 8\nFIELD FieldData 2\na 1 8 float\n0 0 0 0 0 0 0 0\nb 1 8 float\n1 1 1 1 1 1 1 {}\n"
+        constant, varying = self.write("c.vtk", head + arrays.format(1)), self.write("v.vtk", head + arrays.format(2))
+        self.assertIn("a is 0 everywhere, or nearly so\n", self.rendered(constant))
+        self.assertIn("a is 0 everywhere, or nearly so; choose another --scalar\n", self.rendered(varying, "--scalar", "a"))
+        self.assertNotIn("nearly so", self.rendered(varying))
+
+    def test_a_small_part_of_another_colour_is_enough(self):
+        def picture(part):
+            values = " ".join(str(int(i < part and j < part)) for k in range(2) for j in range(41) for i in range(41))
+            return self.rendered(self.write("s.vtk", "# vtk DataFile Version 3.0\ns\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 41 41 2\n"
+                                            "ORIGIN 0 0 0\nSPACING 1 1 4\nPOINT_DATA 3362\nSCALARS s float 1\nLOOKUP_TABLE default\n" + values),
+                                 "--view", "+z", "--range", "0,1", "--opacity", "0:1,1:1", "--tf", "viridis", "--opacity-unit", "0.1")
+        self.assertNotIn("of one colour", picture(11))
+        self.assertIn("of one colour", picture(4))
+
+    def test_well_known_scalars_choose_the_centring(self):
+        path = self.legacy_arrays("cells.vtk", [("Dof", 1)], [("Density1", 1), ("other", 1)])
+        printed = self.run_program("convert", path, "-o", self.folder / "cells.splats").stderr
+        self.assertIn("note: left out: Dof, node-centred: this cache holds the cell-centred scalars", printed)
+        path = self.legacy_arrays("points.vtk", [("Dof", 1), ("p", 1)], [("Density1", 1)])
+        printed = self.run_program("convert", path, "-o", self.folder / "points.splats").stderr
+        self.assertIn("note: left out: Density1, cell-centred", printed)
 
     def test_wrong_usage_of_a_part_leaves_no_folder(self):
         self.run_program("generate", "wake", "--size", "5x4x3", "--steps", "2", "-o", self.folder / "w")

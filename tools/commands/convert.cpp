@@ -126,7 +126,9 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
   };
   if (report.resumed)
     printMessage("note: resumed; {} of {} bricks were already written", report.resumed_bricks, report.bricks);
-  note(report.blanked.by_grid, "samples are blanked by the grid");
+  note(report.blanked.by_grid, description.pieces.empty()
+                                   ? "samples are blanked by the grid"
+                                   : "samples are of cells that are not solid, or blanked by the file");
   note(report.blanked.by_value, "samples have the blank value");
   note(report.blanked.not_finite, fmt::format("samples are {} and are blanked", notFiniteText(description)));
   // For samples at nodes these two differ from what `info` prints: it counts the cells between nodes.

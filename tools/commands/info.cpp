@@ -134,8 +134,9 @@ Json histogramsAsJson(const CacheReader& reader, const Read& read) {
 void printSpread(const char* of, const std::optional<ValueHistogram>& histogram) {
   if (!histogram || !(histogram->lower < histogram->upper)) return;
   fmt::print(
-      "           by volume{}: 1 % below {:.4g}, 50 % below {:.4g}, 99 % below {:.4g}{}\n", of,
-      histogram->percentile(0.01), histogram->percentile(0.5), histogram->percentile(0.99),
+      "           of samples, weighed by volume{}: 1 % below {:.4g}, 50 % below {:.4g}, 99 % below "
+      "{:.4g}{}\n",
+      of, histogram->percentile(0.01), histogram->percentile(0.5), histogram->percentile(0.99),
       histogram->percentiles.empty()
           ? fmt::format(" (to {:.2g}: the cache was made by an earlier program)", histogram->binWidth())
           : "");

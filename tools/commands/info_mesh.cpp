@@ -188,6 +188,8 @@ void printAsText(const MeshInfo& info) {
   for (size_t kind = 1; kind < kKinds.size(); ++kind)
     if (const uint64_t count = info.survey.cells_of[kind]; count > 0)
       kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", count, (count == 1 ? kKind : kKinds)[kind]);
+  if (const uint64_t others = info.survey.cells_of[0]; others > 0)
+    kinds += fmt::format("{}{} not solid or blanked by the file", kinds.empty() ? "" : ", ", others);
   printLine("cells     {}: {}", info.cells, kinds);
   if (description.pieces.size() > 1) {
     for (size_t n = 0; n < std::min(kPiecesListed, description.pieces.size()); ++n)

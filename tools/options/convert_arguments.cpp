@@ -29,6 +29,7 @@
 #include "stream/base/name_list.h"
 #include "stream/base/progress.h"
 #include "stream/cache/series.h"
+#include "tools/options/default_scalars.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/start_checks.h"
@@ -141,8 +142,6 @@ std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const D
 
 namespace {
 
-constexpr size_t kMaxDefaultScalars = 16;
-
 bool isScalar(const GridDescription& description, const std::string& name) {
   try {
     scalarsNamed(description, {name});
@@ -160,41 +159,6 @@ std::vector<std::string> splitAtCommas(const std::string& text) {
     begin = end + 1;
   }
   return parts;
-}
-
-/// Scalars that are not converted unasked, by the reason.
-struct LeftOut {
-  std::vector<std::string> other_centring, others;
-
-  void printNotes(Centring centring) const {
-    const auto print = [](const std::vector<std::string>& names, const std::string& why) {
-      if (!names.empty()) printMessage("note: left out: {}{} --scalar NAME,NAME", listed(names), why);
-    };
-    const bool cells = centring == Centring::kCell;
-    print(other_centring,
-          fmt::format(", {}-centred: this cache holds the {}-centred scalars; convert the others to a second "
-                      "cache with",
-                      cells ? "node" : "cell", cells ? "cell" : "node"));
-    print(others, "; choose scalars with");
-  }
-};
-
-/// The scalars that the files store, which can share a cache with the first: each name once.
-std::vector<uint32_t> storedScalars(const GridDescription& description) {
-  std::vector<uint32_t> positions;
-  LeftOut left_out;
-  std::set<std::string> names;
-  for (uint32_t n = 0; n < description.scalars.size(); ++n) {
-    const GridScalar& scalar = description.scalars[n];
-    if (scalar.derived) continue;
-    const bool fits = positions.empty() || scalar.centring == description.scalars[positions[0]].centring;
-    if (fits && positions.size() < kMaxDefaultScalars && names.insert(scalar.name).second)
-      positions.push_back(n);
-    else
-      (fits ? left_out.others : left_out.other_centring).push_back(scalar.name);
-  }
-  if (!positions.empty()) left_out.printNotes(description.scalars[positions[0]].centring);
-  return positions;
 }
 
 /// The refinement of the cache that is added to or continued, if there is one. Throws UsageError if --refine
@@ -337,11 +301,11 @@ std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std
       const bool is_one = isScalar(description, name);  // its name may have commas
       for (const std::string& part : is_one ? std::vector{name} : splitAtCommas(name))
         if (part == "all" && !isScalar(description, part))
-          stored = storedScalars(description);
+          stored = defaultScalars(description);
         else
           words.push_back(part);
     }
-    if (names.empty()) stored = storedScalars(description);
+    if (names.empty()) stored = defaultScalars(description);
     if (words.empty() && !stored.empty()) return stored;
     for (const std::string& note : notesOnNumbers(description, words)) printMessage("note: {}", note);
     for (const uint32_t position : scalarsNamed(description, words))

@@ -256,12 +256,27 @@ TransferFunction PictureChoice::fromParts(FunctionParts parts, const ScalarArgum
   return withUnit(definition, nullptr, arguments);
 }
 
+namespace {
+
+/// Names what to choose where a scalar is constant: a scalar that is not, or a time step.
+std::string adviceOnConstant(const CacheReader& cache, ChosenFor what) {
+  const std::vector<VariableInfo>& variables = cache.manifest().variables;
+  for (size_t n = 0; n < variables.size(); ++n)
+    if (!isNearlyConstant(variableFor(cache, n, what))) return "; choose another --scalar";
+  for (const VariableInfo& variable : variables)
+    if (!isNearlyConstant(variable))
+      return fmt::format("; choose another --scalar, or another --step ({} varies in one)", variable.name);
+  return "";
+}
+
+}  // namespace
+
 TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
   FunctionParts parts = data().function(arguments.transfer_function.value_or(""), maps_);
   TransferFunctionDefinition definition = parts.definition();
   if (isNearlyConstant(info()))
-    definition.notes.push_back(
-        fmt::format("{} is {} everywhere, or nearly so; choose another --scalar", info().name, info().min));
+    definition.notes.push_back(fmt::format("{} is {} everywhere, or nearly so{}", info().name, info().min,
+                                           adviceOnConstant(cache_, what_)));
   if (!arguments.transfer_function) add("--tf", parts.map);
   add("--range", exact(parts.range.first) + "," + exact(parts.range.second));
   if (parts.asinh) add("--asinh", exact(parts.asinh->centre) + "," + exact(parts.asinh->width));

@@ -78,7 +78,8 @@ CLI::Option* addSourceOption(CLI::App& command, std::vector<std::filesystem::pat
   return command
       .add_option("--source", files,
                   "Take the values from the grid's own cells: from these files, or without any from those "
-                  "that the cache names. Exact, where the cache has rounded means" +
+                  "that the cache names. Exact but within cells of high order, where the cache has "
+                  "rounded means" +
                       note)
       ->expected(0, -1);
 }

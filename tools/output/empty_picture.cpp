@@ -183,7 +183,8 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
 
 std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
                                const std::string& function_options) {
-  constexpr double kMinSeen = 0.005, kMinOther = 0.1;  // of the picture; of what is seen
+  // Parts of the picture; of what is seen. A vortex above a flat sea may be a twentieth of what is seen.
+  constexpr double kMinSeen = 0.005, kMinOther = 0.04;
   // Surfaces and slices have a colour of their own, which no option for the volume changes.
   if (scene.options.scene && !scene.options.scene->empty()) return {};
   const PictureContrast contrast = contrastOf(image, scene.options.background);

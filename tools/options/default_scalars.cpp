@@ -1,0 +1,103 @@
+#include "tools/options/default_scalars.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "stream/base/component_name.h"
+#include "stream/base/error.h"
+#include "stream/base/name_list.h"
+#include "stream/base/text.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kMaxDefaultScalars = 16;
+
+/// Scalars that are not converted unasked, by the reason.
+struct LeftOut {
+  std::vector<std::string> other_centring, same_name, beyond_limit;
+
+  void printNotes(Centring centring) const {
+    const auto print = [](const std::vector<std::string>& names, const std::string& why) {
+      if (!names.empty()) printMessage("note: left out: {}{}", listed(names), why);
+    };
+    const bool cells = centring == Centring::kCell;
+    print(other_centring,
+          fmt::format(", {}-centred: this cache holds the {}-centred scalars; convert the others to a second "
+                      "cache with --scalar NAME,NAME",
+                      cells ? "node" : "cell", cells ? "cell" : "node"));
+    print(same_name, ", a name that an earlier scalar has");
+    print(beyond_limit,
+          fmt::format(", beyond the {} that are converted unasked; choose scalars with --scalar NAME,NAME",
+                      kMaxDefaultScalars));
+  }
+};
+
+/// Whether it is named as a quantity that most flow solvers compute, with any number behind it.
+bool isWellKnown(const GridScalar& scalar) {
+  constexpr std::string_view kNames[] = {
+      "density", "pressure", "temperature", "velocity", "velocitymagnitude", "mach", "p", "t", "u", "rho"};
+  std::string name = lowerCase(scalar.name);
+  if (const std::string_view vector = vectorOf(scalar.name); !vector.empty()) name = lowerCase(vector);
+  name.resize(name.find_last_not_of("0123456789") + 1);
+  return std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
+}
+
+/// How late a scalar is chosen where there are more than kMaxDefaultScalars: well-known ones first, then other scalars and magnitudes,
+/// then components of vectors, then those of tensors, which have no magnitude.
+int lateness(const GridScalar& scalar, const std::set<std::string>& names) {
+  if (isWellKnown(scalar)) return 0;
+  const std::string vector(vectorOf(scalar.name));
+  if (vector.empty() || scalar.name == vector + ":mag") return 1;
+  return names.count(vector + ":mag") > 0 ? 2 : 3;
+}
+
+/// The centring of the first scalar, unless scalars of the other alone are well known.
+Centring defaultCentring(const GridDescription& description, const std::vector<uint32_t>& stored) {
+  const Centring first = description.scalars[stored.front()].centring;
+  bool any_first = false, any_other = false;
+  for (const uint32_t n : stored)
+    if (isWellKnown(description.scalars[n]))
+      (description.scalars[n].centring == first ? any_first : any_other) = true;
+  if (any_first || !any_other) return first;
+  return first == Centring::kNode ? Centring::kCell : Centring::kNode;
+}
+
+}  // namespace
+
+std::vector<uint32_t> defaultScalars(const GridDescription& description) {
+  std::vector<uint32_t> stored, positions;
+  for (uint32_t n = 0; n < description.scalars.size(); ++n)
+    if (!description.scalars[n].derived) stored.push_back(n);
+  if (stored.empty()) return {};
+  const Centring centring = defaultCentring(description, stored);
+  LeftOut left_out;
+  std::set<std::string> names;
+  for (const uint32_t n : stored) {
+    const GridScalar& scalar = description.scalars[n];
+    if (scalar.centring != centring)
+      left_out.other_centring.push_back(scalar.name);
+    else if (!names.insert(scalar.name).second)
+      left_out.same_name.push_back(scalar.name);
+    else
+      positions.push_back(n);
+  }
+  if (positions.size() > kMaxDefaultScalars) {
+    std::stable_sort(positions.begin(), positions.end(), [&](uint32_t a, uint32_t b) {
+      return lateness(description.scalars[a], names) < lateness(description.scalars[b], names);
+    });
+    std::sort(positions.begin(), positions.begin() + kMaxDefaultScalars);
+    for (size_t n = kMaxDefaultScalars; n < positions.size(); ++n)
+      left_out.beyond_limit.push_back(description.scalars[positions[n]].name);
+    positions.resize(kMaxDefaultScalars);
+  }
+  left_out.printNotes(centring);
+  return positions;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,16 @@
+// Chooses the scalars that `convert` takes where none are named. Any thread.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+/// The scalars that the files store and that can share a cache, each name once and 16 at most: positions in description.scalars, in their
+/// order. They have the centring of the first one, unless quantities that flow solvers compute are there in the other alone. Beyond 16,
+/// components are left out before scalars, those of tensors first. Prints notes that name what is left out, and how to choose it.
+std::vector<uint32_t> defaultScalars(const GridDescription& description);
+
+}  // namespace curvisplat
