@@ -65,8 +65,12 @@ TEST_F(WindowPanels, TheValueUnderTheMouseIsThatOfTheData) {
   const std::string status = widget("status f ");
   std::smatch parts;
   ASSERT_TRUE(std::regex_search(
-      status, parts, std::regex("f (\\S+) at (\\S+), (\\S+), (\\S+); node i (\\d+), j (\\d+), k (\\d+)")))
+      status, parts,
+      std::regex("f (\\S+) at x (\\S+), y (\\S+), z (\\S+); node i (\\d+), j (\\d+), k (\\d+)")))
       << status;
+  // Beside the data it says that there are none.
+  moveTo(placeOf("picture", 0.02, 0.02));
+  widget("status no data here");
   // `info --probe` finds the same sample there.
   const ProgramResult probed =
       runProgram({"info", "a.splats", "--probe",
@@ -118,7 +122,7 @@ TEST_F(WindowPanels, MarkersSayHowFarApartTheyAre) {
     click(placeOf("picture", across, 0.5));
     std::smatch parts;
     const std::string message = widget(begin);
-    ASSERT_TRUE(std::regex_search(message, parts, std::regex("at (\\S+), (\\S+), (\\S+);"))) << message;
+    ASSERT_TRUE(std::regex_search(message, parts, std::regex("at x (\\S+), y (\\S+), z (\\S+);"))) << message;
     points.push_back({std::stod(parts[1]), std::stod(parts[2]), std::stod(parts[3])});
   }
   openMarkers();

@@ -212,7 +212,7 @@ TEST_F(WindowMovie, OnceAroundIsWhatRenderDraws) {
   open({"--scalar", "volume"}, {480, 360});
   press("h");  // without the panels
   ASSERT_TRUE(eventually([] { return !hasWidget("curve"); }));
-  saveMovie("Save movie: once around...", "movie/m.png");
+  saveMovie("Save film: once around...", "movie/m.png");
   placeOf("stop movie");
   press("x");  // the movie is of what was shown then
   EXPECT_TRUE(isSaved());
@@ -240,7 +240,7 @@ TEST_F(WindowMovie, WithoutFfmpegAPageIsOffered) {
   setenv("PATH", file("bin").c_str(), 1);
   open({"--scalar", "volume"}, {480, 360});
   setenv("PATH", path.c_str(), 1);
-  choose("File", "Save movie: once around...");
+  choose("File", "Save film: once around...");
   placeOf("file name");
   press("Return");
   EXPECT_TRUE(isSaved());
@@ -253,7 +253,7 @@ TEST_F(WindowMovie, AllTimeStepsAreItsFrames) {
   run({"convert", "w.xyz", "w_%04d.fun", "-o", "steps.splats", "--overwrite"});
   cache_ = "steps";
   open({"--step", "2"});
-  saveMovie("Save movie: all time steps...", "movie/m.png");
+  saveMovie("Save film: all time steps...", "movie/m.png");
   EXPECT_TRUE(isSaved());
   saveAndCopy();
   Words command = close().at(0);
@@ -327,11 +327,11 @@ TEST_F(WindowMovie, AFilmIsMadePlayedSavedAndDrawnAsRenderDrawsIt) {
   placeOf("key frame 2 drawn");
   EXPECT_GE(difference(save(), first), 50);
 
-  click("Save movie: film...");
+  click("Save film: key frames...");
   answer("movie/m.png");
   const auto is_written = [] { return fs::exists("movie/m_0005.png") && !hasWidget("stop movie"); };
   EXPECT_TRUE(eventually(is_written, 300));
-  click("Copy command for the film");
+  click("Copy command for the key frames");
   save();
   const auto command = close().at(0);
   EXPECT_EQ(filesIn("movie"), 7u);  // with the film
@@ -342,10 +342,46 @@ TEST_F(WindowMovie, AFilmIsMadePlayedSavedAndDrawnAsRenderDrawsIt) {
   EXPECT_LT(difference(readImage("movie/m_0000.png"), readImage("movie/m_0003.png")), 40);
 }
 
+/// A film is there again in the next window, and a key frame that was deleted comes back by undo.
+TEST_F(WindowMovie, AFilmIsKeptAndItsKeyFramesAreUndone) {
+  const auto show = [&] {
+    open({}, {900, 700});
+    tab("View");
+    click("Film");
+  };
+  show();
+  press("x");
+  save();
+  click("add key frame");
+  press("y");
+  save();
+  click("add key frame");
+  placeOf("key frame 2 drawn");
+  save();
+  click("delete key frame");
+  EXPECT_TRUE(eventually([] { return !hasWidget("key frame 2"); }));
+  save();
+  press("ctrl+z");
+  placeOf("key frame 2 drawn");
+  close();
+  show();
+  placeOf("key frame 2 drawn");
+  placeOf("film length of 2 s, 51 pictures");
+  click("delete key frame");
+  EXPECT_TRUE(eventually([] { return !hasWidget("key frame 2"); }));
+  click("delete key frame");
+  EXPECT_TRUE(eventually([] { return !hasWidget("key frame 1"); }));
+  close();
+  show();
+  placeOf("add key frame");
+  EXPECT_FALSE(hasWidget("key frame 1"));
+  close();
+}
+
 TEST_F(WindowMovie, OneThatIsStoppedLeavesNothing) {
   if (!fs::exists("/usr/bin/ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
   open();
-  saveMovie("Save movie: once around...", "movie/m.mp4");
+  saveMovie("Save film: once around...", "movie/m.mp4");
   click("stop movie");
   EXPECT_TRUE(eventually([] { return hasWidget("message Stopped. The movie was not saved."); }));
   EXPECT_EQ(filesIn("movie"), 0u);
@@ -356,7 +392,7 @@ TEST_F(WindowMovie, OneThatIsStoppedLeavesNothing) {
 TEST_F(WindowMovie, IsAFileThatPlays) {
   if (!fs::exists("/usr/bin/ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed";
   open({}, {481, 361});
-  choose("File", "Save movie: once around...");
+  choose("File", "Save film: once around...");
   placeOf("movie of pictures a second: 90 pictures, 3.6 s");
   const auto type = [&](const std::string& field, const std::string& number) {
     click(field);
@@ -382,7 +418,7 @@ TEST_F(WindowMovie, IsAFileThatPlays) {
 
 TEST_F(WindowMovie, AnEndingThatCannotBeWrittenIsSaid) {
   open();
-  saveMovie("Save movie: once around...", "movie/m.avi");
+  saveMovie("Save film: once around...", "movie/m.avi");
   EXPECT_TRUE(eventually([] { return hasWidget("message "); }));
   EXPECT_EQ(filesIn("movie"), 0u);
   save();

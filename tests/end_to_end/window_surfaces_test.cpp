@@ -146,6 +146,32 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
   for (size_t n = 0; n < 5; ++n) expectDraws(commands[n], *pictures[n]);
 }
 
+/// The volume takes the opacities of a scalar whose isosurface is to be drawn, and gets its own back when that is removed.
+TEST_F(WindowSurfaces, AnIsosurfaceThatIsRemovedLeavesTheVolumeAsBefore) {
+  openObjects();
+  const Image before = save();
+  moveTo(placeOf("eye of volume"));
+  EXPECT_TRUE(eventually([] { return hasWidget("hint It can be hidden once something else is shown"); }));
+  unfold("Isosurfaces", "Add an isosurface");
+  click("Add an isosurface");
+  placeOf("isosurface 1");
+  click("scalar of isosurface 1");
+  click("isosurface 1 by volume");
+  placeOf("isosurface 1 is not drawn");
+  click("draw isosurface 1");
+  EXPECT_TRUE(gone("isosurface 1 is not drawn"));
+  moveTo(rest_);
+  EXPECT_LT(difference(saveAndCopy(), before), 45);
+  click("remove isosurface 1");
+  EXPECT_TRUE(gone("remove isosurface 1"));
+  moveTo(rest_);
+  EXPECT_GE(difference(saveAndCopy(), before), 50);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_EQ(valueOf(commands[0], "--opacity-by"), "volume");
+  EXPECT_EQ(valueOf(commands[1], "--opacity-by"), "");
+}
+
 /// Widgets with one label below two headings both work: of all that can be listed at once, none is another's twin.
 TEST_F(WindowSurfaces, NoTwoWidgetsAreOne) {
   openObjects({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);

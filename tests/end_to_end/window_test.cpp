@@ -234,6 +234,7 @@ TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
   chooseScalar("volume");  // volumes: above zero, as a logarithm needs
   const Image linear = save();
   click("log scale");
+  placeOf("scale logarithmic");
   const Image logarithmic = save();
   EXPECT_LT(difference(linear, logarithmic), 40);
   click(placeOf("range", 0.15));

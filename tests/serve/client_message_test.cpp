@@ -135,6 +135,13 @@ TEST(ClientMessage, IsReadWithEachType) {
   EXPECT_EQ(histogram.low, -1);
   EXPECT_EQ(histogram.high, 2);
   EXPECT_EQ(parsed<ColoursRequest>(R"({"type": "colours", "map": "viridis"})").map, "viridis");
+  const auto colours = parsed<ColoursRequest>(
+      R"({"type": "colours", "map": "viridis", "parts": {"map": "grey", "range": [1, 3], "opacity_unit": 2}})");
+  EXPECT_EQ(colours.parts.value().range.second, 3);
+  const auto iso = parsed<IsosurfaceRequest>(
+      R"({"type": "isosurface", "cache": 0, "step": 4, "scalar": "f", "state": {"a": 1}})");
+  EXPECT_EQ(iso.step, 4u);
+  EXPECT_EQ(iso.scalar, "f");
   const auto pick = parsed<PickRequest>(R"({"type": "pick", "x": 0.25, "y": 1})");
   EXPECT_EQ(pick.x, 0.25);
   EXPECT_EQ(pick.y, 1);
@@ -177,6 +184,10 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
   refuses(R"({"type": "histogram", "cache": 0, "scalar": "a", "low": -1e308, "high": 1e308, "log": false})",
           "high");
   refuses(R"({"type": "histogram", "cache": 0, "scalar": "a", "low": 0, "high": 2, "log": true})", "low");
+  refuses(
+      R"({"type": "colours", "map": "grey", "parts": {"map": "grey", "range": [3, 1], "opacity_unit": 2}})",
+      "range");
+  refuses(R"({"type": "isosurface", "cache": 0, "step": 4, "scalar": "f"})", "state");
   refuses(R"({"type": "colours", "map": ")" + std::string(1001, 'a') + R"("})", "map");
   refuses(R"({"type": "pick", "x": 0, "y": 1, "hovers": 1})", "hovers");
   refuses(R"({"type": "shown", "picture": 1e300})", "picture");

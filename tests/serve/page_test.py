@@ -92,8 +92,9 @@ def differing_from(tab, file, by=0):
       let n = 0; for (let k = 0; k < a.length; ++k) n += Math.abs(a[k] - b[k]) > {by}; return n; }})()""")
 
 
-def copies_the_command(tab, caches, edited):
-    """The command that the page shows draws its picture, in the folder of the cache; an edited function is in a file."""
+def copies_the_command(tab, caches, edited, colours=None):
+    """The command that the page shows draws its picture, in the folder of the cache; an edited function is in a file, one with
+    the built-in map `colours` is not."""
     # The grid's lines that lie behind the data are in the command's picture alone.
     tab.run("state.axes_grid = false; showState(); changed()")
     if edited:
@@ -113,8 +114,9 @@ def copies_the_command(tab, caches, edited):
         (pathlib.Path(caches[0]).parent / name).write_text(content)
     tab.run("document.getElementById('copied').close()")
     expect("/" not in text.split()[2], f"the command names no folder of the server: {text}")
-    if edited:
-        expect(len(files) == 1, f"files of functions: {files}")
+    expect(len(files) == (1 if edited else 0), f"files of functions: {files}")
+    if colours:
+        expect(f"--tf {colours} --range" in text, f"the command names the map {colours}: {text}")
     words = shlex.split(text)
     expect(words[:2] == ["curvisplat", "render"], text)
     subprocess.run([program, *words[1:]], cwd=pathlib.Path(caches[0]).parent, check=True, capture_output=True)
@@ -161,7 +163,7 @@ def navigation(browser, server, caches):
     changes(tab, lambda: tab.mouse("mouseWheel", *MIDDLE, deltaX=0, deltaY=-300), "the wheel", "zoomed")
     expect(tab.run(f"{PAGE}.state.camera.parallel_scale") < moved["parallel_scale"], "the wheel zooms in")
     tab.run("document.getElementById('picture').focus()")
-    for key in "xYzor":
+    for key in "xYzior":
         changes(tab, lambda key=key: tab.key(key), f"the key {key}", f"key_{key}")
     expect(tab.run(f"{PAGE}.state.camera.perspective"), "the key o changes the projection")
     changes(tab, lambda: tab.click("#projection"), "the box of the projection")
@@ -209,7 +211,17 @@ def objects(tab):
     changes(tab, lambda: press(tab, "#add-iso"), "an isosurface", "isosurface")
     low, high = tab.run("range()")
     value = tab.run(f"{PAGE}.state.isosurfaces[0].value")
-    expect(abs(value - (low + high) / 2) < 1e-6 * (high - low), f"it begins in the middle of {low} to {high}: {value}")
+    # It halves what is seen: the bins of the histogram, each times its opacity. The function is linear.
+    tab.wait("histogram && histogram.scalar === holder().variable", "the histogram")
+    halves = tab.run("""(() => { const list = points(), at = u => { const n = Math.max(1, list.findIndex(p => p.u >= u));
+        const [a, b] = [list[n - 1], list[n]]; return a.opacity + (u - a.u) / (b.u - a.u || 1) * (b.opacity - a.opacity); };
+      const seen = histogram.bins.map((b, n) => b * at((n + 0.5) / histogram.bins.length)), all = seen.reduce((a, b) => a + b);
+      let sum = 0; return seen.findIndex(b => (sum += b) > all / 2) / seen.length; })()""")
+    expect(abs((value - low) / (high - low) - halves) < 0.02, f"it halves what is seen of {low} to {high}: {value}, not {halves}")
+    expect(tab.run("document.querySelector('#isosurfaces .beyond').hidden"), "its value is within the scalar's range")
+    set_value(tab, "#isosurfaces input[type=number]", "99")
+    expect(not tab.run("document.querySelector('#isosurfaces .beyond').hidden"), "a value beyond the scalar's range is said to be so")
+    set_value(tab, "#isosurfaces input[type=number]", repr(value))
     changes(tab, lambda: set_value(tab, "#isosurfaces input[type=number]", repr(low + 0.3 * (high - low))), "its value")
     changes(tab, lambda: press(tab, "#volume"), "the isosurface alone", "isosurface_alone")
     copied = tab.run(f"{PAGE}.state.isosurfaces")
@@ -217,6 +229,34 @@ def objects(tab):
     press(tab, "#volume")
     changes(tab, lambda: press(tab, "#isosurfaces button:last-of-type"), "no isosurface")
     expect(rest(tab) == before, "the picture is the one before")
+
+
+def typed_numbers(tab):
+    """Places of planes, their normals, and the sides of the clip box are typed; undone and done again."""
+    lower, upper = tab.run("[cache.lower, cache.upper]")
+    changes(tab, lambda: press(tab, "#add-slice"), "a slice")
+    before = rest(tab)
+    changes(tab, lambda: press(tab, "#slices button:nth-of-type(2)"), "a slice across x")
+    wanted = lower[0] + 0.3 * (upper[0] - lower[0])
+    changes(tab, lambda: set_value(tab, "#slices .at", repr(wanted)), "its place")
+    expect(abs(tab.run(f"{PAGE}.state.slices[0].point[0]") - wanted) < 1e-9, "it is where the number says")
+    expect(tab.run("document.querySelector('#slices .at').previousSibling.previousSibling.textContent") == "at x", "the number is of x")
+    changes(tab, lambda: set_value(tab, "#slices .triple input:nth-of-type(2)", "1"), "its tilt", "tilted")
+    normal = tab.run(f"{PAGE}.state.slices[0].normal")
+    expect(max(abs(a - b) for a, b in zip(normal, (0.5 ** 0.5, 0.5 ** 0.5, 0))) < 1e-9, f"a normal of 1, 1, 0: {normal}")
+    tab.run("document.getElementById('picture').focus()")
+    for _ in range(3):
+        tab.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'z', ctrlKey: true }))")
+        rest(tab)
+    expect(rest(tab) == before, "Ctrl+Z undoes the tilt, the place and the direction")
+    tab.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Z', ctrlKey: true, shiftKey: true }))")
+    expect(rest(tab) != before and tab.run(f"{PAGE}.state.slices[0].normal") == [1, 0, 0], "Ctrl+Shift+Z does the first again")
+    press(tab, "#slices button:last-of-type")
+    set_value(tab, "#clip", "on")
+    changes(tab, lambda: set_value(tab, "#clip-x-upper-number", repr(wanted)), "a number of the clip box")
+    expect(abs(tab.run(f"{PAGE}.state.clip_box.upper[0]") - wanted) < 1e-9, "the clip box ends where the number says")
+    set_value(tab, "#clip", "off")
+    rest(tab)
 
 
 def choose_map(tab, name):
@@ -288,13 +328,34 @@ def editing(tab):
     press(tab, "#slices .eye")
     press(tab, "#volume")
     press(tab, "#slices button:last-of-type")
+    expect("once something else is shown" in tab.run("document.getElementById('volume').title"), "its eye says so")
     objects(tab)
+    typed_numbers(tab)
     rest(tab)
     expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
 
 
+def saves_pictures(tab):
+    """As shown, and of another size; the page says what was saved."""
+    tab.run("window.saves = []; download = (blob, name) => window.saves.push([name, blob]); document.getElementById('save').click()")
+    size = tab.run(f"[{PAGE}.header.width, {PAGE}.header.height]")
+    expect(tab.run("document.getElementById('status').textContent") == f"saved annulus.png, {size[0]} x {size[1]} pixels", "what was saved is said")
+    before = rest(tab)
+    set_value(tab, "#save-size", "1920x1080")
+    press(tab, "#save")
+    tab.wait("window.saves.length === 2", "the larger picture")
+    tab.run("createImageBitmap(window.saves[1][1]).then(b => { window.saved = [b.width, b.height]; })")
+    expect(tab.wait("window.saved", "its size") == [1920, 1080], f"it has the size that was chosen: {tab.run('window.saved')}")
+    expect(tab.run("document.getElementById('status').textContent") == "saved annulus.png, 1920 x 1080 pixels", "its size is said")
+    expect(rest(tab) == before, "the view is as it was")
+    set_value(tab, "#save-size", "")
+
+
 def sizes(tab):
-    for width, height, ratio in ((640, 480, 1), (390, 844, 2), (1920, 1080, 1), (1280, 800, 1)):
+    rest(tab)
+    first = tab.run(f"{PAGE}.state.camera.parallel_scale")
+    widths = []
+    for width, height, ratio in ((640, 480, 1), (390, 844, 2), (1920, 1080, 1), (1280, 800, RATIO)):
         tab.resize(width, height, ratio)
         time.sleep(0.3)
         rest(tab)
@@ -302,6 +363,11 @@ def sizes(tab):
         stage = tab.run("(() => { const r = document.getElementById('stage').getBoundingClientRect(); return [r.width, r.height]; })()")
         header = tab.run(f"[{PAGE}.header.width, {PAGE}.header.height]")
         expect(all(abs(a * ratio - b) <= 1 for a, b in zip(stage, header)), f"a page of {width}x{height}: {stage}, {header}")
+        # A narrow picture shows as much of the data's width as a usual one does.
+        scale, usual = tab.run(f"[{PAGE}.state.camera.parallel_scale / Math.max(1, cache.shape / shapeOf()), cache.shape]")
+        widths.append(scale)
+        expect(max(widths) < 1.1 * min(widths), f"the data keep their width: {widths}, of a shape of {usual}")
+    expect(abs(tab.run(f"{PAGE}.state.camera.parallel_scale") / first - 1) < 0.1, f"and come back as they were: {widths}")
     # A phone: one finger rotates, two zoom and move.
     tab.resize(390, 844, 2, mobile=True)
     time.sleep(0.3)
@@ -467,6 +533,8 @@ def markers(tab):
     expect(tab.run(f"{PAGE}.errors.length") == 0, "which is no error")
     expect(marker["name"] == "1" and marker["value"] == marker["value"] and len(marker["point"]) == 3, f"a marker: {marker}")
     names = tab.run("[...document.querySelectorAll('.sign, #markers span')].map(e => e.textContent)")
+    places = tab.run("[...document.querySelectorAll('#markers .place')].map(e => e.textContent)")
+    expect(len(places) == 1 and places[0].startswith("x ") and ", z " in places[0], f"its place is in the list: {places}")
     expect(len(names) == 2 and all(text.startswith(f"1: {marker['scalar']} ") for text in names), f"its texts name its scalar: {names}")
     sign = "(() => { const r = document.querySelector('.sign').getBoundingClientRect(); return [r.x, r.y + r.height / 2]; })()"
     left, middle = tab.run(sign)
@@ -476,6 +544,10 @@ def markers(tab):
     moved = tab.run(sign)
     expect(abs(moved[0] - left - 40) < 4 and abs(moved[1] - middle - 20) < 4, f"it moves with the data: {moved}, from {[left, middle]}")
     shot(tab, "marker")
+    # A second one, and how far it is from the first.
+    tab.run(f"{PAGE}.state.markers.push({{ ...{PAGE}.state.markers[0], name: '2', point: {PAGE}.state.markers[0].point.map((v, n) => v + [2, 3, 6][n]) }}); showMarkers()")
+    expect(tab.run("document.querySelector('#markers .distance').textContent") == "distance 1 to 2: 7", "the distance between two")
+    tab.run(f"{PAGE}.state.markers.pop(); showMarkers()")
     tab.run("document.querySelector('#markers button').click()")
     expect(tab.run(f"{PAGE}.state.markers.length") == 0 and not tab.run("Boolean(document.querySelector('.sign'))"), "a marker is removed")
 
@@ -491,6 +563,15 @@ def two_scalars(tab):
     expect(tab.run(f"{PAGE}.state.function.Points") == own, "the colours' function is as it was")
     changes(tab, lambda: set_value(tab, "#opacity_by", ""), "the same scalar again")
     expect(tab.run(f"{PAGE}.state.opacity_by") is None, "one scalar again")
+    # Isosurfaces of another scalar are drawn by its opacities, and the volume gets its own back when the last one is removed.
+    tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    alone = rest(tab)
+    changes(tab, lambda: press(tab, "#add-iso"), "an isosurface")
+    changes(tab, lambda: set_value(tab, "#isosurfaces select", names[1]), "its scalar")
+    changes(tab, lambda: press(tab, "#isosurfaces .dim button"), "to draw it", "other_isosurface")
+    expect(tab.run(f"{PAGE}.state.opacity_by.variable") == names[1], "by the opacities of its scalar")
+    changes(tab, lambda: press(tab, "#isosurfaces button:last-of-type"), "no isosurface")
+    expect(tab.run(f"{PAGE}.state.opacity_by") is None and rest(tab) == alone, "the volume is as before")
     # Another scalar's function is chosen from its own values, also after this one's was edited; the colours stay.
     first = tab.run(f"{PAGE}.state.variable")
     automatic = {}
@@ -651,6 +732,18 @@ with tempfile.TemporaryDirectory() as folder:
             copies_the_command(tab, caches, edited=False)
             copies_the_command(tab, caches, edited=True)
             tab.click("#automatic")
+            tab.wait(f"{PAGE}.state.preset === 'automatic'", "the automatic function")
+            choose_map(tab, "viridis")
+            tab.wait("document.getElementById('map').textContent === 'viridis'", "the colours")
+            copies_the_command(tab, caches, edited=False, colours="viridis")
+            tab.run("setRange(...range(), false)")  # on a linear scale from now on
+            choose_map(tab, "magma")
+            tab.wait("document.getElementById('map').textContent === 'magma'", "the colours")
+            tab.run("setPoints([[0, 0.2], [0.3, 0.9], [1, 0.1]].map(([u, opacity]) => ({ u, opacity, midpoint: 0.5, sharpness: 0 }))); changed()")
+            copies_the_command(tab, caches, edited=False, colours="magma")
+            tab.click("#automatic")
+            tab.wait(f"{PAGE}.state.preset === 'automatic'", "the automatic function")
+            saves_pictures(tab)
             print("command done")
             markers(tab)
             print("markers done")

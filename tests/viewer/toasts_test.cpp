@@ -8,6 +8,7 @@
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "tests/support/expect_error.h"
+#include "tools/view/history.h"
 #include "tools/view/view_state.h"
 #include "tools/window/window_commands.h"
 
@@ -95,24 +96,24 @@ TEST(History, GoesBackAndForth) {
   manifest.upper = {1, 1, 1};
   manifest.variables = {{0, "density", "", 0, 1}};
   ViewState state = firstViewOf(manifest, {300, 200});
-  History history(state);
-  history.record(state);  // unchanged
+  History history(state, {});
+  history.record(state, {});  // unchanged
   EXPECT_FALSE(history.canUndo());
   state.dark = false;
-  history.record(state);
+  history.record(state, {});
   state.lit = true;
-  history.record(state);
+  history.record(state, {});
   ASSERT_TRUE(history.canUndo());
-  EXPECT_FALSE(history.undo()->lit);
-  EXPECT_TRUE(history.undo()->dark);
+  EXPECT_FALSE(history.undo()->state.lit);
+  EXPECT_TRUE(history.undo()->state.dark);
   EXPECT_EQ(history.undo(), nullptr);
-  const ViewState again = *history.redo();
+  const ViewState again = history.redo()->state;
   EXPECT_FALSE(again.dark);
   ViewState other = again;
   other.lod_pixels = 3;
-  history.record(other);  // what could be redone is gone
+  history.record(other, {});  // what could be redone is gone
   EXPECT_FALSE(history.canRedo());
-  EXPECT_EQ(history.undo()->lod_pixels, 1);
+  EXPECT_EQ(history.undo()->state.lod_pixels, 1);
 }
 
 TEST(Commands, EachKeyHasOne) {

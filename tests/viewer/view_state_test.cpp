@@ -57,6 +57,44 @@ ViewState changedState() {
   return state;
 }
 
+TEST(ViewState, OpacitiesTakenForIsosurfacesAreGivenBackWithTheLast) {
+  Manifest manifest;
+  manifest.upper = {1, 1, 1};
+  manifest.variables = {{0, "density", "", 0, 1}, {0, "pressure", "", 0, 1}};
+  ViewState state = firstViewOf(manifest, {300, 200});
+  state.isosurfaces = {{"pressure", 0.5}, {"pressure", 0.6}};
+  state.takeOpacitiesFor("pressure");
+  state.opacity_by = OpacityScalar{"pressure", state.function};
+  state = viewStateFromJson(toJson(state), "test", manifest);
+  EXPECT_FALSE(state.giveOpacitiesBack());
+  state.isosurfaces.pop_back();
+  EXPECT_FALSE(state.giveOpacitiesBack());
+  state.isosurfaces.clear();
+  EXPECT_TRUE(state.giveOpacitiesBack());
+  EXPECT_FALSE(state.opacity_by);
+  EXPECT_FALSE(state.giveOpacitiesBack());
+}
+
+/// The page changes the points alone: a built-in map and its opacities are stated by options even so.
+TEST(ViewState, PointsOfABuiltInMapNeedNoFile) {
+  Manifest manifest;
+  manifest.upper = {1, 1, 1};
+  manifest.variables = {{0, "density", "", 0, 1}};
+  ViewState state = firstViewOf(manifest, {300, 200});
+  auto json = nlohmann::ordered_json::parse(toJson(state));
+  const EditedFunction viridis("viridis", 2, 4, 0.5);
+  json["function"] = nlohmann::ordered_json::parse(toParaViewPreset(viridis.definition())).front();
+  json["preset"] = "";
+  const ViewState read = viewStateFromJson(json.dump(), "test", manifest);
+  ASSERT_TRUE(read.function.parts());
+  EXPECT_EQ(read.function.parts()->map, "viridis");
+  EXPECT_EQ(read.function.range(), std::pair(2.0, 4.0));
+  EXPECT_NE(renderCommand(read, {}).find("--tf viridis --range 2,4"), std::string::npos)
+      << renderCommand(read, {});
+  json["function"]["RGBPoints"][1] = 0.9;  // a colour that is not the map's
+  EXPECT_TRUE(needsFile(viewStateFromJson(json.dump(), "test", manifest).function));
+}
+
 TEST(ViewState, ComesBackFromItsText) {
   const std::string text = toJson(changedState());
   const auto before = nlohmann::json::parse(text).flatten();
@@ -238,9 +276,9 @@ TEST(ViewState, HeightsAreScaledAroundThePlaceInFocus) {
 }
 
 TEST(PlaceText, HasDegreesOnAGlobeAndCoordinatesElsewhere) {
-  EXPECT_EQ(placeText({0.5, -2.25, 1e6}, std::nullopt), "0.5, -2.25, 1e+06");
+  EXPECT_EQ(placeText({0.5, -2.25, 1e6}, std::nullopt), "x 0.5, y -2.25, z 1e+06");
   const Globe lengths{Globe::Shape::kLengths, 6371, 20, 0};
-  EXPECT_EQ(placeText({0.5, -2.25, 10}, lengths), "0.5, -2.25, 10");
+  EXPECT_EQ(placeText({0.5, -2.25, 10}, lengths), "x 0.5, y -2.25, z 10");
   // A kilometre down, 50 times exaggerated, at 30° W, 60° N.
   const double r = 6371 - 50, half = 0.5 * r;
   const Globe sphere{Globe::Shape::kSphere, 6371, 50, 0};

@@ -53,22 +53,22 @@ void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelAc
   const bool has_keys = !film.keys().empty(), selects = film.selected().has_value();
   // The buttons stay where they are when the first key frame is added: "add" is pressed again and again.
   does.add |=
-      button("add key frame", "add key frame", true, "of what is shown now, after the one that is selected");
+      button("Add key frame", "add key frame", true, "of what is shown now, after the one that is selected");
   ImGui::SameLine();
-  does.replace |= button("update", "update key frame", selects, "the selected one shows what is shown now");
+  does.replace |= button("Update", "update key frame", selects, "the selected one shows what is shown now");
   ImGui::SameLine();
-  does.remove |= button("delete", "delete key frame", selects, "the selected one");
+  does.remove |= button("Delete", "delete key frame", selects, "the selected one");
   ImGui::SameLine();
-  does.play |= button(film.isPlaying() ? "stop" : "play", "play film", film.end() > film.begin(), nullptr);
-  does.open |= button("open...", "open film", true, "a file of key frames, as render --path draws it");
+  does.play |= button(film.isPlaying() ? "Stop" : "Play", "play film", film.end() > film.begin(), nullptr);
+  does.open |= button("Open...", "open film", true, "a file of key frames, as render --path draws it");
   ImGui::SameLine();
   does.save |=
-      button("save...", "save film", has_keys, "the key frames, for render --path and for the next time");
+      button("Save...", "save film", has_keys, "the key frames, for render --path and for the next time");
   ImGui::SameLine();
   ImGui::BeginDisabled(!has_keys);
-  commandButton(Command::kSaveFilmMovie, actions, "movie...");
+  commandButton(Command::kSaveFilmMovie, actions, "Save film...");
   ImGui::SameLine();
-  commandButton(Command::kCopyFilmCommand, actions, "copy film's command");
+  commandButton(Command::kCopyFilmCommand, actions, "Copy command");
   ImGui::EndDisabled();
   if (has_keys) {
     drawPictures(film, pictures, does);

@@ -69,7 +69,7 @@ void paintLine(const CurveCanvas& canvas, const std::function<float(double)>& he
 }
 
 void paintCurve(const EditedFunction& function, const std::vector<double>& histogram,
-                std::span<const double> marked, const CurveCanvas& canvas) {
+                std::span<const double> marked, const CurveCanvas& canvas, bool has_colours) {
   paintHistogram(histogram, canvas);
   const OpacityCurve curve(function.points());
   paintLine(canvas, [&](double x) { return heightOf(curve.at(x)); });
@@ -86,7 +86,8 @@ void paintCurve(const EditedFunction& function, const std::vector<double>& histo
   }
   for (const OpacityPoint& point : function.points()) {
     const ImVec2 at = canvas.at(point.x, heightOf(point.opacity));
-    list->AddCircleFilled(at, kPointRadius * unit, toImGui(function.colourAt(point.x)));
+    list->AddCircleFilled(at, kPointRadius * unit,
+                          has_colours ? toImGui(function.colourAt(point.x)) : plotColours().bars);
     list->AddCircle(at, kPointRadius * unit, plotColours().edge, 0, 0.08f * unit);
   }
 }

@@ -36,9 +36,10 @@ struct CurveCanvas {
 void paintHistogram(const std::vector<double>& histogram, const CurveCanvas& canvas);
 /// Paints a line from left to right; `height` gives its height at each x, both from 0 to 1.
 void paintLine(const CurveCanvas& canvas, const std::function<float(double)>& height);
-/// Paints histogram, curve and points. `marked`: scalars at which a line stands, those of isosurfaces.
+/// Paints histogram, curve and points. `marked`: scalars at which a line stands, those of isosurfaces. `has_colours`: the points
+/// have those of the function; otherwise they are grey.
 void paintCurve(const EditedFunction& function, const std::vector<double>& histogram,
-                std::span<const double> marked, const CurveCanvas& canvas);
+                std::span<const double> marked, const CurveCanvas& canvas, bool has_colours);
 /// A strip of colours: `at` gives that of each part, 0..1.
 void paintStrip(const ImVec2& lower, const ImVec2& size, const std::function<glm::dvec3(double)>& at);
 /// The width of curve, colours and numbers: half a point of the curve's end lies beside it.

@@ -83,7 +83,7 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
   result.error = updateHistogram(function, variable);
   const float left = shows == Shows::kColours ? 0 : widthOfHeights();
   if (left > 0) ImGui::Indent(left);
-  if (shows != Shows::kColours) result.changed |= drawCurve(function, marked);
+  if (shows != Shows::kColours) result.changed |= drawCurve(function, marked, shows == Shows::kAll);
   if (shows != Shows::kOpacities) paintColours(function);
   paintNumbers(function);
   if (left > 0) ImGui::Unindent(left);
@@ -108,11 +108,11 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
     nameWidget("colour points");
   }
   if (shows != Shows::kOpacities) {
-    result.load = ImGui::Button("load from file...");
+    result.load = ImGui::Button("Load from file...");
     nameWidget("load");
     hint("colours and opacities from a ParaView preset, .json");
     ImGui::SameLine();
-    result.save = ImGui::Button("save to file...");
+    result.save = ImGui::Button("Save to file...");
     nameWidget("save");
     hint("as a ParaView preset, .json");
   }
@@ -121,7 +121,7 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
   return result;
 }
 
-bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> marked) {
+bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> marked, bool has_colours) {
   const CurveCanvas canvas{ImGui::GetCursorScreenPos(),
                            {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
   ImGui::InvisibleButton("curve", canvas.size,
@@ -153,7 +153,7 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
       function.movePoint(*dragged_, canvas.xOf(mouse), opacityAt(canvas.heightAt(mouse)));
     changed = true;
   }
-  paintCurve(function, histogram_, marked, canvas);
+  paintCurve(function, histogram_, marked, canvas, has_colours);
   paintHeights(canvas);
   if (const auto shown = dragged_ ? dragged_ : near) {
     const OpacityPoint& point = function.points()[*shown];
@@ -252,7 +252,7 @@ bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
 bool FunctionPanel::drawColours(EditedFunction& function) {
   constexpr size_t kMany = 12;
   if (function.colours().size() > kMany) {
-    const bool thins = ImGui::Button("edit these colours");
+    const bool thins = ImGui::Button("Edit these colours");
     nameWidget("edit these colours");
     hint("nine points in place of the colour map");
     if (thins) function.thinColours();
@@ -314,6 +314,12 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
   label("range");
   if (const auto typed = typed_.draw("##range", ends, "%.6g")) set((*typed)[0], (*typed)[1]);
   nameWidget("range");
+  const char* const scale = function.asinhScale() ? "asinh" : function.logScale() ? "logarithmic" : "linear";
+  label("scale");
+  ImGui::TextUnformatted(scale);
+  nameWidget(fmt::format("scale {}", scale));
+  if (function.asinhScale())
+    hint("chosen from the data: linear around their middle, logarithmic further out");
   bool log_scale = function.logScale();
   if (option("log scale", log_scale)) {
     if (function.setLogScale(log_scale))
@@ -324,39 +330,42 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
   const VariableInfo& all = cache_.seriesManifest().variables[variable];
   const std::vector<SeriesStep>& steps = cache_.series().steps;
   ImGui::SameLine();
-  if (ImGui::Button("full range")) set(all.min, all.max);
+  if (ImGui::Button("Full range")) set(all.min, all.max);
   nameWidget("full range");
   if (steps.size() > 1) {
     ImGui::SameLine();
     const StepValues& of = steps[step].values[variable];
-    if (ImGui::Button("range of this step")) set(of.min, of.max);
+    if (ImGui::Button("Range of this step")) set(of.min, of.max);
     nameWidget("range of this step");
   }
 }
 
 void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   label("opacities");
-  const auto button = [](const char* name, const char* what) {
-    const bool pressed = ImGui::Button(name);
+  const auto button = [](const char* name, const char* text, const char* what) {
+    const bool pressed = ImGui::Button(text);
     nameWidget(name);
     hint(what);
     return pressed;
   };
-  result.automatic |= button("automatic", "range and opacities as they are chosen from the data");
+  result.automatic |=
+      button("automatic", "Automatic", "range and opacities as they are chosen from the data");
   ImGui::SameLine();
-  if (button("ramp", "the colour map with its own opacities, which rise with the values")) {
+  if (button("ramp", "Ramp", "the colour map with its own opacities, which rise with the values")) {
     const std::string name = function.map().empty() ? kMapsOnDark.sequential : function.map();
     function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
     result.changed = true;
   }
-  const auto set = [&](const char* name, const char* what, std::span<const OpacityPoint> points) {
+  const auto set = [&](const char* name, const char* text, const char* what,
+                       std::span<const OpacityPoint> points) {
     ImGui::SameLine();
-    if (!button(name, what)) return;
+    if (!button(name, text, what)) return;
     function.setOpacities({points.begin(), points.end()});
     result.changed = true;
   };
-  set("band", "values in the middle of the range alone; Shift + drag moves its points together", kBand);
-  set("clear", "nothing; add points for what is to be seen", kClear);
+  set("band", "Band", "values in the middle of the range alone; Shift + drag moves its points together",
+      kBand);
+  set("clear", "Clear", "nothing; add points for what is to be seen", kClear);
 }
 
 void FunctionPanel::drawUnit(EditedFunction& function, Result& result) {

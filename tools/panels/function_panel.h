@@ -35,7 +35,7 @@ class FunctionPanel {
               std::span<const double> marked = {});
 
  private:
-  bool drawCurve(EditedFunction& function, std::span<const double> marked);
+  bool drawCurve(EditedFunction& function, std::span<const double> marked, bool has_colours);
   bool drawPoints(EditedFunction& function);
   bool drawMaps(EditedFunction& function, Result& result);
   bool drawColours(EditedFunction& function);

@@ -20,7 +20,8 @@ void commandButton(Command command, PanelActions& actions, const char* text) {
   const CommandInfo& info = infoOf(command);
   if (ImGui::Button(text ? text : info.label)) actions.run(command);
   nameWidget(info.label);
-  if (*info.key_name) hint(info.key_name);
+  if (!*info.key_name) return;
+  hint(text ? fmt::format("{} ({})", info.label, info.key_name).c_str() : info.key_name);
 }
 
 void commandOption(Command command, PanelActions& actions, const char* text, bool on) {
@@ -110,7 +111,7 @@ void hint(const char* text) {
   static double since_s = 0;
   const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
   const bool is_same = hovered.x == from.x && hovered.y == from.y;
-  if (!ImGui::IsItemHovered() || ImGui::IsItemActive()) {
+  if (!ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled) || ImGui::IsItemActive()) {
     if (is_same) hovered = {-1, -1};
     return;
   }
@@ -126,6 +127,7 @@ void hint(const char* text) {
   ImGui::SetNextWindowPos({std::max(0.0f, std::min(from.x, screen.x - width)),
                            below + height > screen.y ? from.y - style.ItemSpacing.y - height : below});
   ImGui::SetTooltip("%s", text);
+  nameWidget(std::string("hint ") + text);
 }
 
 }  // namespace curvisplat

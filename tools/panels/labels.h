@@ -32,6 +32,7 @@ struct PanelActions {
   std::vector<Command> commands;
   std::optional<StepPosition> time;                   // to go to
   std::optional<bool> interpolates;                   // between steps
+  std::optional<std::string> draw_isosurfaces_of;     // this scalar, by its opacities
   std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
   std::optional<std::string> add_faces;               // of the grid, by name
   std::optional<std::pair<size_t, std::string>> isosurface_scalar;  // of the n-th one

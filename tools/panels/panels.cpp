@@ -51,11 +51,11 @@ int drawTabs(int number, int select) {
 
 void drawFooter(PanelActions& actions) {
   ImGui::Separator();
-  commandButton(Command::kSavePicture, actions, "save picture");
+  commandButton(Command::kSavePicture, actions, "Save picture");
   ImGui::SameLine();
-  commandButton(Command::kSaveTurnMovie, actions, "movie once around...");
+  commandButton(Command::kSaveTurnMovie, actions, "Film once around...");
   ImGui::SameLine();
-  commandButton(Command::kCopyCommand, actions, "copy command");
+  commandButton(Command::kCopyCommand, actions, "Copy command");
 }
 
 }  // namespace
@@ -110,6 +110,8 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
     state.volume = draws_volume;
     actions.changed = true;
   }
+  if (!state.hasSheets())
+    hint("It can be hidden once something else is shown: a surface, an isosurface or a slice.");
   ImGui::SameLine();
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted("volume");
@@ -134,7 +136,7 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   bool interpolates = playback.interpolates();
   if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
   ImGui::Spacing();
-  commandButton(Command::kSaveStepsMovie, actions, "save movie of all steps...");
+  commandButton(Command::kSaveStepsMovie, actions, "Save film of all steps...");
 }
 
 namespace {
@@ -161,11 +163,15 @@ void drawFurther(const FurtherScalars& further, bool for_opacities, PanelActions
                                                : "more, added when chosen:");
   if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
   ImGui::BeginDisabled(further.is_busy);
-  for (const SourceScalar& one : further.scalars) {
-    if (ImGui::Selectable(
-            fmt::format("{}{}", scalarTitle(one.name, one.unit), one.derived ? "  (computed)" : "").c_str()))
-      actions.add_scalar = {one.name, for_opacities};
-    nameWidget((for_opacities ? "further opacity by " : "further scalar ") + one.name);
+  for (const bool derived : {false, true}) {
+    const auto is_one = [derived](const SourceScalar& one) { return one.derived == derived; };
+    if (derived && std::ranges::any_of(further.scalars, is_one)) ImGui::TextDisabled("computed when chosen:");
+    for (const SourceScalar& one : further.scalars) {
+      if (!is_one(one)) continue;
+      if (ImGui::Selectable(scalarTitle(one.name, one.unit).c_str()))
+        actions.add_scalar = {one.name, for_opacities};
+      nameWidget((for_opacities ? "further opacity by " : "further scalar ") + one.name);
+    }
   }
   ImGui::EndDisabled();
 }
@@ -341,7 +347,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   drawVerticalScale(state, cache_.manifest().globe, actions);
   heading("Camera");
   const bool perspective = state.camera.projection == Projection::kPerspective;
-  commandButton(Command::kFit, actions, "fit");
+  commandButton(Command::kFit, actions, "Fit");
   ImGui::SameLine();
   commandOption(Command::kOtherProjection, actions, "perspective", perspective);
   ImGui::SameLine();
@@ -381,7 +387,7 @@ void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string
   nameWidget("view name");
   ImGui::SameLine();
   ImGui::BeginDisabled(view_name_.empty());
-  saves |= ImGui::Button("save##view");
+  saves |= ImGui::Button("Save##view");
   nameWidget("save view");
   ImGui::EndDisabled();
   if (saves && !view_name_.empty()) actions.save_view = std::exchange(view_name_, {});

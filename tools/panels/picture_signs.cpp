@@ -225,10 +225,10 @@ glm::dvec3 unstretched(const glm::dvec3& point, const std::optional<Globe>& glob
 /// Draws the distance between two markers, along a straight line and without --scale.
 void drawDistance(const Marker& from, const Marker& to, const std::optional<Globe>& globe) {
   const std::string text = fmt::format(
-      "{} to {}: {:.5g}{}", from.name, to.name,
+      "distance {} to {}: {:.5g}{}", from.name, to.name,
       glm::distance(unstretched(from.point, globe), unstretched(to.point, globe)), globe ? " km" : "");
   ImGui::TextDisabled("%s", text.c_str());
-  nameWidget("distance " + text);
+  nameWidget(text);
   hint(!globe            ? "along a straight line, in the units of the coordinates"
        : globe->sphere() ? "along a straight line, through the Earth"
                          : "along a straight line");

@@ -74,15 +74,15 @@ void opacitySlider(const char* text, const std::string& name, double& opacity, P
   nameWidget(name);
 }
 
-/// Returns where a button "remove" at the right end of a line begins.
+/// Returns where a button "Remove" at the right end of a line begins.
 float removeFrom() {
-  return ImGui::GetContentRegionMax().x - ImGui::CalcTextSize("remove").x -
+  return ImGui::GetContentRegionMax().x - ImGui::CalcTextSize("Remove").x -
          2 * ImGui::GetStyle().FramePadding.x;
 }
 
 bool removeButton(const std::string& name) {
   ImGui::SameLine(removeFrom());
-  const bool removes = ImGui::Button("remove");
+  const bool removes = ImGui::Button("Remove");
   nameWidget("remove " + name);
   return removes;
 }
@@ -299,7 +299,7 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
   }
   ImGui::EndDisabled();
   ImGui::BeginDisabled(is_full);
-  commandButton(Command::kAddSurfaceFile, actions, "add from a file...");
+  commandButton(Command::kAddSurfaceFile, actions, "Add from a file...");
   ImGui::EndDisabled();
   hint("STL, PLY or OBJ");
   drawColouring(state, actions);
@@ -382,12 +382,12 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
       ImGui::TextDisabled("not drawn: those of %s are", state.isoScalar().c_str());
       nameWidget(name + " is not drawn");
       ImGui::SameLine();
-      if (ImGui::SmallButton("draw it"))
-        actions.opacity_scalar = one.scalar == state.variable ? "" : one.scalar;
+      if (ImGui::SmallButton("Draw it")) actions.draw_isosurfaces_of = one.scalar;
       nameWidget("draw " + name);
       hint(
           "One scalar's isosurfaces are drawn at a time: that of the opacities, or of the colours;\n"
-          "without the volume, any scalar's. This takes the volume's opacities from the scalar.");
+          "without the volume, any scalar's. This takes the volume's opacities from the scalar,\n"
+          "until its last isosurface is removed.");
     }
     ImGui::PopID();
   }

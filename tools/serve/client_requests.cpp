@@ -179,7 +179,14 @@ ClientMessage parseClientMessage(std::string_view text, size_t caches) {
   if (name == "view") return viewIn(message, caches);
   if (name == "choose") return functionIn(message, caches);
   if (name == "histogram") return histogramIn(message, caches);
-  if (name == "colours") return ColoursRequest{nameIn(message, "map")};
+  if (name == "colours") {
+    ColoursRequest colours{nameIn(message, "map")};
+    if (const auto parts = message.find("parts")) colours.parts = functionPartsFrom(*parts);
+    return colours;
+  }
+  if (name == "isosurface")
+    return IsosurfaceRequest{cacheIn(message, caches), message.at("step").count(0, kMaxNumber),
+                             nameIn(message, "scalar"), stateIn(message)};
   if (name == "pick") {
     const auto hovers = message.find("hovers");
     return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1), hovers && hovers->flag()};
@@ -188,7 +195,7 @@ ClientMessage parseClientMessage(std::string_view text, size_t caches) {
     return CommandRequest{cacheIn(message, caches), sizeIn(message), message.at("step").count(0, kMaxNumber),
                           stateIn(message)};
   if (name == "shown") return ShownReport{message.at("picture").count(0, kMaxNumber)};
-  type.fail("open, view, choose, histogram, colours, pick, command or shown");
+  type.fail("open, view, choose, histogram, colours, isosurface, pick, command or shown");
 }
 
 }  // namespace curvisplat

@@ -18,7 +18,11 @@
 //   {"type": "histogram", "cache": 0,            asks for a scalar's histogram
 //    "scalar": "density", "low": 0, "high": 1,
 //    "log": false}
-//   {"type": "colours", "map": "viridis"}        asks for a colour map's points
+//   {"type": "colours", "map": "viridis",        asks for a colour map's points; with `parts`, as ViewState's
+//    "parts": {...}}                             JSON has those of a function: along its range
+//   {"type": "isosurface", "cache": 0,           asks for the value at which an isosurface begins
+//    "step": 0, "scalar": "density",
+//    "state": {...}}
 //   {"type": "pick", "x": 0.4, "y": 0.7}         asks what the picture at rest shows there; x and y are
 //                                                fractions of its sides; "hovers": true asks for the value
 //                                                under a mouse that rests, which may be nothing
@@ -39,6 +43,7 @@
 #include <variant>
 #include <vector>
 
+#include "render/colour/function_parts.h"
 #include "render/image/image.h"
 
 namespace curvisplat {
@@ -98,6 +103,13 @@ struct HistogramRequest {
 };
 struct ColoursRequest {
   std::string map;
+  std::optional<FunctionParts> parts = std::nullopt;
+};
+struct IsosurfaceRequest {
+  size_t cache = 0;
+  uint64_t step = 0;
+  std::string scalar;
+  std::string state;
 };
 struct PickRequest {
   double x = 0, y = 0;  // 0..1, from the upper left corner
@@ -114,8 +126,9 @@ struct ShownReport {
   uint64_t picture = 0;
 };
 
-using ClientMessage = std::variant<OpenRequest, ViewRequest, FunctionRequest, HistogramRequest,
-                                   ColoursRequest, PickRequest, CommandRequest, ShownReport>;
+using ClientMessage =
+    std::variant<OpenRequest, ViewRequest, FunctionRequest, HistogramRequest, ColoursRequest,
+                 IsosurfaceRequest, PickRequest, CommandRequest, ShownReport>;
 
 /// Parses and checks a message. `caches`: how many are served. Throws Error that begins with "message" for
 /// any other text.

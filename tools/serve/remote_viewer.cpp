@@ -85,6 +85,7 @@ class RemoteViewer::Work {
     if (inbox.function) answer([&] { return caches_.functionText(*inbox.function); });
     if (inbox.histogram) answer([&] { return caches_.histogramText(*inbox.histogram); });
     if (inbox.colours) answer([&] { return ServedCaches::coloursText(*inbox.colours); });
+    if (inbox.isosurface) answer([&] { return caches_.isosurfaceText(*inbox.isosurface); });
     if (inbox.command) answer([&] { return commandText(*inbox.command); });
   }
 
@@ -338,6 +339,7 @@ void RemoteViewer::receive(ClientMessage message) {
     if (auto* const function = std::get_if<FunctionRequest>(&message)) inbox_.function = std::move(*function);
     if (auto* const one = std::get_if<HistogramRequest>(&message)) inbox_.histogram = std::move(*one);
     if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
+    if (auto* const iso = std::get_if<IsosurfaceRequest>(&message)) inbox_.isosurface = std::move(*iso);
     if (auto* const pick = std::get_if<PickRequest>(&message))
       if (!pick->hovers || !inbox_.pick || inbox_.pick->hovers) inbox_.pick = *pick;  // a click is not lost
     if (auto* const command = std::get_if<CommandRequest>(&message)) inbox_.command = std::move(*command);

@@ -68,6 +68,7 @@ class RemoteViewer {
     std::optional<FunctionRequest> function;
     std::optional<HistogramRequest> histogram;
     std::optional<ColoursRequest> colours;
+    std::optional<IsosurfaceRequest> isosurface;
     std::optional<PickRequest> pick;
     std::optional<CommandRequest> command;
     std::vector<uint64_t> shown;

@@ -43,6 +43,8 @@ std::string stripOf(const EditedFunction& function, int colours = kStripColours)
 void addFunction(Json& json, const EditedFunction& function) {
   json["preset"] = function.preset();
   json["function"] = Json::parse(toParaViewPreset(function.definition())).front();
+  const auto parts = function.parts();
+  json["parts"] = parts ? jsonOf(*parts) : Json(nullptr);
   json["strip"] = stripOf(function);
 }
 
@@ -89,15 +91,18 @@ ServedCaches::ServedCaches(const std::vector<fs::path>& paths, const FacesOf& fa
   }
 }
 
+/// The width of the data's part of a picture to its height, in the first view.
+double ServedCaches::aspectOf(size_t cache, ImageSize picture) const {
+  const Served& served = caches_[cache];
+  const ImageSize data = dataSizeOf(served.first, served.reader.manifest(), picture);
+  return static_cast<double>(data.width) / data.height;
+}
+
 /// The camera was chosen for the usual shape of a window; in a narrower one it is further away, and sees as much of the
 /// data's width.
 ViewState ServedCaches::firstView(size_t cache, ImageSize size) const {
   ViewState state = caches_[cache].first;
-  const auto aspect_in = [&](ImageSize picture) {
-    const ImageSize data = dataSizeOf(state, caches_[cache].reader.manifest(), picture);
-    return static_cast<double>(data.width) / data.height;
-  };
-  const double narrower = std::max(1.0, aspect_in(kFirstSize) / aspect_in(size));
+  const double narrower = std::max(1.0, aspectOf(cache, kFirstSize) / aspectOf(cache, size));
   Camera& camera = state.camera;
   camera.parallel_scale *= narrower;
   camera.position = camera.focal_point + narrower * (camera.position - camera.focal_point);
@@ -141,6 +146,7 @@ std::string ServedCaches::cacheText(const OpenRequest& request) const {
   json["times"] = Json::array();
   for (const SeriesStep& step : cache.reader.series().steps) json["times"].push_back(step.time);
   json["time_unit"] = cache.reader.seriesManifest().time_unit;
+  json["shape"] = aspectOf(request.cache, kFirstSize);
   const ViewState state = firstView(request.cache, request.size);
   json["state"] = Json::parse(toJson(state));
   json["strip"] = stripOf(state.function);
@@ -197,8 +203,25 @@ std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& sc
 
 std::string ServedCaches::coloursText(const ColoursRequest& request) {
   Json json = {{"type", "colours"}, {"map", request.map}};
-  addFunction(json, EditedFunction(request.map, 0, 1, 1));
+  EditedFunction function(request.map, 0, 1, 1);
+  if (request.parts) {
+    function = EditedFunction(*request.parts);
+    function.setColours(request.map);
+  }
+  addFunction(json, function);
   return textOf(json);
+}
+
+std::string ServedCaches::isosurfaceText(const IsosurfaceRequest& request) const {
+  const Served& cache = caches_[request.cache];
+  const CacheReader& reader = cache.reader;
+  variableOf(reader, cache.name, request.scalar);
+  if (request.step >= reader.series().steps.size()) throw UsageError("there is no step {}", request.step);
+  const ViewState state = viewStateFromJson(request.state, "view", reader.manifest());
+  const MutexLock lock(reading_);
+  const double value = firstIsovalue(reader.atStep(request.step), state, request.scalar);
+  return textOf(
+      {{"type", "isosurface"}, {"cache", request.cache}, {"scalar", request.scalar}, {"value", value}});
 }
 
 std::string ServedCaches::commandText(const CommandRequest& request) const {

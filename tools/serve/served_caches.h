@@ -50,6 +50,7 @@ class ServedCaches {
   std::string markerText(size_t cache, const MarkedScalar& scalar,
                          const std::optional<glm::dvec3>& point) const;
   static std::string coloursText(const ColoursRequest& request);
+  std::string isosurfaceText(const IsosurfaceRequest& request) const;
   /// The `curvisplat render` command that draws a view, for a folder that has the cache, and the files of functions that its
   /// options cannot state. Throws Error for a state that is not one of this cache.
   std::string commandText(const CommandRequest& request) const;
@@ -58,6 +59,7 @@ class ServedCaches {
   std::string errorText(std::string text) const;
 
  private:
+  double aspectOf(size_t cache, ImageSize picture) const;
   struct Served {
     std::string name;
     CacheReader reader;

@@ -138,6 +138,14 @@ void FilmEdit::open(const Film& film, const ViewState& state, std::optional<doub
   goTo(0);
 }
 
+void FilmEdit::goBackTo(const FilmEdit& earlier) {
+  if (earlier.film_ == film_) return;
+  const uint64_t newest = std::max(pictures_, earlier.pictures_);
+  *this = earlier;
+  pictures_ = newest;
+  stop();
+}
+
 void FilmEdit::play(double now_s) {
   if (time_ >= end()) goTo(begin());
   if (end() > begin()) began_s_ = now_s - time_;

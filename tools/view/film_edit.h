@@ -56,6 +56,8 @@ class FilmEdit {
   /// Takes the place of the film with another one, of which each key frame gets what it does not state from the view.
   /// Times begin at 0.
   void open(const Film& film, const ViewState& state, std::optional<double> series_time);
+  /// Takes the key frames of an earlier state of itself, if they are others. Small pictures keep their numbers.
+  void goBackTo(const FilmEdit& earlier);
 
   bool isPlaying() const { return began_s_.has_value(); }
   /// Plays on from time(), from the beginning at the end.

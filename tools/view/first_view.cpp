@@ -9,6 +9,7 @@
 #include "render/automatic/first_choice.h"
 #include "render/colour/control_points.h"
 #include "stream/base/threads.h"
+#include "stream/cache/value_histogram.h"
 
 namespace curvisplat {
 namespace {
@@ -58,6 +59,15 @@ double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& 
   const double before = *(next - 1);
   return function.scalarAt(
       (static_cast<double>(next - sums.begin()) - 1 + (half - before) / (*next - before)) / count);
+}
+
+double firstIsovalue(const CacheReader& cache, const ViewState& state, const std::string& scalar) {
+  const size_t variable = cache.variableNamed(scalar);
+  const VariableInfo& info = cache.manifest().variables[variable];
+  EditedFunction function(kMapsOnDark.sequential, info.min, info.max, state.function.opacityUnit());
+  if (state.opacityScalar() == scalar)
+    function = state.opacity_by ? state.opacity_by->function : state.function;
+  return middleOfSeen(histogramOf(cache, variable, function, kHistogramBins), function);
 }
 
 EditedFunction chosenAnew(const EditedFunction& before, EditedFunction automatic) {

@@ -27,6 +27,10 @@ EditedFunction automaticFunction(const CacheReader& cache, const std::string& sc
 /// transparent it divides the volume, and without any volume the range. `histogram`: as of histogramOf().
 double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function);
 
+/// The value at which an isosurface of a scalar begins: middleOfSeen() of the opacities that the state has for it, or of its
+/// volume. Reads the scalar's histogram at the cache's step. Throws UsageError if there is no such scalar, and Error as reading does.
+double firstIsovalue(const CacheReader& cache, const ViewState& state, const std::string& scalar);
+
 /// The function of another scalar, after `before`: the automatic one, with its opacities and their unit, which those of the
 /// scalar before do not suit. A colour map that the user has chosen stays.
 EditedFunction chosenAnew(const EditedFunction& before, EditedFunction automatic);

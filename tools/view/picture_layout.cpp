@@ -83,7 +83,8 @@ const std::optional<AnnotatedScene::OnGlobe>& GlobeGrid::boxOf(const ViewState& 
 }
 
 std::string placeText(const glm::dvec3& point, const std::optional<Globe>& globe) {
-  if (!globe || !globe->degrees()) return fmt::format("{:.5g}, {:.5g}, {:.5g}", point.x, point.y, point.z);
+  if (!globe || !globe->degrees())
+    return fmt::format("x {:.5g}, y {:.5g}, z {:.5g}", point.x, point.y, point.z);
   const glm::dvec3 place = globe->geographic(point);
   const double east = std::remainder(place.x, 360);
   return fmt::format("{:.3f}°{}, {:.3f}°{}, {} {:.0f} m", std::abs(east), east < 0 ? "W" : "E",

@@ -47,6 +47,11 @@ std::optional<fs::path> rememberedStateOf(const fs::path& cache) {
   return *folder / "views" / fmt::format("{}-{}.json", whole.stem().string(), hashOf(whole.string()));
 }
 
+std::optional<fs::path> rememberedFilmOf(const fs::path& cache) {
+  const auto state = rememberedStateOf(cache);
+  return state ? std::optional(state->parent_path() / (state->stem().string() + "_film.json")) : std::nullopt;
+}
+
 namespace {
 
 constexpr size_t kMaxRecent = 12;

@@ -22,6 +22,9 @@ std::optional<std::filesystem::path> configFolder();
 /// The state file of this cache, named by the cache's name and a hash of its path; nullopt without a folder.
 std::optional<std::filesystem::path> rememberedStateOf(const std::filesystem::path& cache);
 
+/// The file of the film that was made of this cache, beside its state; nullopt without a folder.
+std::optional<std::filesystem::path> rememberedFilmOf(const std::filesystem::path& cache);
+
 /// The window's own settings, whatever it shows.
 struct WindowSettings {
   bool light_theme = false;

@@ -13,6 +13,7 @@
 #include "render/mesh/triangle_mesh.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
+#include "tools/view/stated_function.h"
 
 namespace curvisplat {
 namespace {
@@ -88,15 +89,22 @@ EditedFunction functionFrom(const JsonField& fields, const std::filesystem::path
   const JsonField preset = fields.at("preset");
   const bool automatic = preset.text() == EditedFunction::kAutomatic;
   try {
+    std::optional<FunctionParts> read;
     if (const auto parts = fields.find("parts")) {
-      const FunctionParts read = functionPartsFrom(*parts);
-      EditedFunction function(read);
+      read = functionPartsFrom(*parts);
+      EditedFunction function(*read);
       if (automatic) function.setAutomatic();
       // The points are what counts: who changes them may not know of the parts.
       const Json points = Json::parse(toParaViewPreset(function.definition())).front();
       if (points == fields.at("function").json() && function.preset() == preset.text()) return function;
     }
-    EditedFunction function(parseParaViewPreset(fields.at("function").json().dump(), path), opacity_unit);
+    const TransferFunctionDefinition points = parseParaViewPreset(fields.at("function").json().dump(), path);
+    if (const auto stated = partsOfPoints(points, read, opacity_unit);
+        stated && !automatic && preset.text().empty()) {
+      const EditedFunction function(*stated);
+      if (function.parts()) return function;
+    }
+    EditedFunction function(points, opacity_unit);
     if (automatic)
       function.setAutomatic();
     else if (!preset.text().empty())
@@ -112,6 +120,11 @@ void put(Json& json, const EditedFunction& function) {
   json["preset"] = function.preset();
   json["parts"] = partsOf(function);
   json["function"] = Json::parse(toParaViewPreset(function.definition())).front();
+}
+
+void put(Json& json, const OpacityScalar& opacities) {
+  json = {{"variable", opacities.variable}};
+  put(json, opacities.function);
 }
 
 glm::vec3 colourFrom(const JsonField& field) {
@@ -190,6 +203,13 @@ const VariableInfo* find(const Manifest& manifest, const std::string& name) {
   return found == manifest.variables.end() ? nullptr : &*found;
 }
 
+OpacityScalar opacityScalarFrom(const JsonField& fields, const std::filesystem::path& path,
+                                const Manifest& manifest, double opacity_unit) {
+  const JsonField variable = fields.at("variable");
+  if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+  return {variable.text(), functionFrom(fields, path, opacity_unit)};
+}
+
 double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
   const double diagonal = glm::length(scale * (manifest.upper - manifest.lower));
   return diagonal > 0 ? diagonal / 100 : 1;
@@ -258,6 +278,22 @@ std::vector<double> ViewState::isovalues() const {
   for (const Isosurface& one : isosurfaces)
     if (one.visible && one.scalar == isoScalar()) values.push_back(one.value);
   return values;
+}
+
+void ViewState::takeOpacitiesFor(const std::string& scalar) {
+  if (opacities_before)
+    opacities_before->drawn = scalar;
+  else
+    opacities_before = OpacitiesBefore{scalar, opacity_by};
+}
+
+bool ViewState::giveOpacitiesBack() {
+  const auto is_drawn = [this](const Isosurface& one) { return one.scalar == opacities_before->drawn; };
+  if (!opacities_before || std::ranges::any_of(isosurfaces, is_drawn)) return false;
+  opacity_by = std::move(opacities_before->opacity_by);
+  if (opacity_by && opacity_by->variable == variable) opacity_by.reset();
+  opacities_before.reset();
+  return true;
 }
 
 bool ViewState::hasIsosurfacesOfThird() const {
@@ -409,6 +445,9 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
 
 void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown) {
   if (state.opacity_by && !find(manifest, state.opacity_by->variable)) state.opacity_by.reset();
+  if (auto& before = state.opacities_before;
+      before && before->opacity_by && !find(manifest, before->opacity_by->variable))
+    before->opacity_by.reset();
   if (state.faces_by && !find(manifest, state.faces_by->variable)) state.faces_by.reset();
   hideOthers(state.isosurfaces, manifest);
   if (!find(manifest, state.variable)) chooseVariable(state, manifest, shown);
@@ -418,9 +457,11 @@ std::string toJson(const ViewState& state) {
   Json json = {{"curvisplat_view", 1}, {"variable", state.variable}, {"camera", jsonOf(state.camera)}};
   put(json, state.function);
   json["opacity_by"] = nullptr;
-  if (state.opacity_by) {
-    json["opacity_by"] = {{"variable", state.opacity_by->variable}};
-    put(json["opacity_by"], state.opacity_by->function);
+  if (state.opacity_by) put(json["opacity_by"], *state.opacity_by);
+  json["opacities_before"] = nullptr;
+  if (const auto& before = state.opacities_before) {
+    Json& kept = json["opacities_before"] = {{"drawn", before->drawn}, {"opacity_by", nullptr}};
+    if (before->opacity_by) put(kept["opacity_by"], *before->opacity_by);
   }
   json["lod_pixels"] = state.lod_pixels;
   json["memory_bytes"] = state.memory_bytes;
@@ -486,32 +527,19 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   state.dark = fields.at("dark").flag();
   state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};
   if (const auto grid = fields.find("axes_grid")) state.annotations.axes_grid = grid->flag();
-  if (const auto opacity = fields.find("opacity_by")) {
-    const JsonField by = opacity->at("variable");
-    if (!find(manifest, by.text())) by.fail("a scalar of the cache");
-    state.opacity_by =
-        OpacityScalar{by.text(), functionFrom(*opacity, path, defaultOpacityUnit(manifest, factors))};
+  const double unit = defaultOpacityUnit(manifest, factors);
+  if (const auto opacity = fields.find("opacity_by"))
+    state.opacity_by = opacityScalarFrom(*opacity, path, manifest, unit);
+  if (const auto before = fields.find("opacities_before")) {
+    state.opacities_before = OpacitiesBefore{before->at("drawn").text()};
+    if (const auto opacity = before->find("opacity_by"))
+      state.opacities_before->opacity_by = opacityScalarFrom(*opacity, path, manifest, unit);
   }
   takeSurfaces(fields, path, manifest, state);
   if (const auto markers = fields.find("markers"))
     for (const JsonField& marker : markers->elements(kMaxMarkers))
       state.markers.push_back(markerFrom(marker));
   return state;
-}
-
-namespace {
-
-constexpr size_t kMaxStates = 200;
-
-}  // namespace
-
-void History::record(const ViewState& state) {
-  // Whether two are the same: what is saved of them says so, and costs less than a millisecond.
-  if (toJson(state) == toJson(states_[at_])) return;
-  states_.resize(at_ + 1, state);
-  states_.push_back(state);
-  if (states_.size() > kMaxStates) states_.erase(states_.begin());
-  at_ = states_.size() - 1;
 }
 
 }  // namespace curvisplat

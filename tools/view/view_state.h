@@ -1,6 +1,6 @@
-// Everything that defines a picture: camera, scalar, transfer function, cuts, surfaces, detail; and the
-// history of such states, for undo and redo. States are saved as JSON between windows, and translated to a
-// `curvisplat render` command (saved_views.h). Value types: one thread at a time may use an object.
+// Everything that defines a picture: camera, scalar, transfer function, cuts, surfaces, detail. States are
+// saved as JSON between windows, and translated to a `curvisplat render` command (saved_views.h). Value types:
+// one thread at a time may use an object.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -83,6 +83,12 @@ struct GivenSheets {
   std::vector<std::pair<std::string, std::string>> options;  // of `render`, which show the same
 };
 
+/// Keeps what gave the volume its opacities before it took those of a scalar whose isosurfaces were to be drawn.
+struct OpacitiesBefore {
+  std::string drawn;  // that scalar
+  std::optional<OpacityScalar> opacity_by = std::nullopt;
+};
+
 struct ViewState {
   static constexpr double kLightStrength = 0.7;
 
@@ -111,6 +117,7 @@ struct ViewState {
   bool dark = true;                                          // background
   Annotations annotations{.scalar_bar = true, .axes = true};
   std::optional<OpacityScalar> opacity_by = std::nullopt;
+  std::optional<OpacitiesBefore> opacities_before = std::nullopt;
   std::vector<Marker> markers = {};
   std::shared_ptr<const GivenSheets> given = nullptr;
 
@@ -123,6 +130,11 @@ struct ViewState {
   const std::string& isoScalar() const;
   /// The values of the isosurfaces that are drawn, all of isoScalar().
   std::vector<double> isovalues() const;
+  /// Keeps the present opacities for giveOpacitiesBack(), before those of `scalar` take their place so that its isosurfaces are drawn.
+  void takeOpacitiesFor(const std::string& scalar);
+  /// Gives the volume the opacities again that it had before, once no isosurface of that scalar is left, hidden or not. Returns
+  /// whether it did.
+  bool giveOpacitiesBack();
   /// Whether the isosurfaces are of a scalar that gives neither colours nor opacities.
   bool hasIsosurfacesOfThird() const;
   /// Whether anything but the volume is drawn, or would be without it.
@@ -167,24 +179,5 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
 
 /// The name of the scalar that the state shows. Throws Error as above.
 std::string scalarOfViewState(const std::string& text, const std::filesystem::path& path);
-
-/// Undo and redo: the states of a view that were at rest, the newest last.
-class History {
- public:
-  explicit History(const ViewState& first) : states_{first} {}
-
-  /// Keeps a state at which the user rests: after a drag, not during it. A state equal to the newest is not
-  /// kept; a state after an undo replaces what could be redone. The oldest of more than 200 are forgotten.
-  void record(const ViewState& state);
-  bool canUndo() const { return at_ > 0; }
-  bool canRedo() const { return at_ + 1 < states_.size(); }
-  /// The state before or after; nullptr if there is none. Valid until the next record().
-  const ViewState* undo() { return canUndo() ? &states_[--at_] : nullptr; }
-  const ViewState* redo() { return canRedo() ? &states_[++at_] : nullptr; }
-
- private:
-  std::vector<ViewState> states_;
-  size_t at_ = 0;
-};
 
 }  // namespace curvisplat

@@ -76,7 +76,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       state_(firstState(prepared, options)),
       first_function_(state_.function),
       first_state_(options.carried ? "" : toJson(state_)),
-      history_(options.carried ? options.carried->history : History(state_)),
+      history_(options.carried ? options.carried->history : History(state_, {})),
       panels_(cache_),
       playback_(cache_.series().steps.size(), joinedSteps(cache_.series())),
       backend_(options.backend),
@@ -90,6 +90,10 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
   frames_.emplace(cache_, backend_, Window::wake, std::move(after));
   playback_.goTo(cache_.step());
   setBounds();
+  if (!prepared.film) return;
+  reports_.attempt([&] { takeFilm(*prepared.film); });
+  first_film_ = film_.film();
+  if (!options.carried) history_ = History(state_, film_);
 }
 
 /// Keys show what the clip box leaves.
@@ -286,6 +290,11 @@ void CacheView::react(const WindowLayout& layout) {
   if (layout.shows_panels) actions = drawPanels(layout);
   if (isSeries()) drawTimeBar(cache_, playback_, layout.time, actions);
   reports_.attempt([&] { apply(actions); });
+  if (state_.giveOpacitiesBack()) {
+    chooser_.drop(FunctionChooser::For::kOpacities);
+    ++function_version_;
+    changed_ = true;
+  }
   if (isShown()) changed_ |= playback_.tick(clockSeconds());
   if (isShown() && film_.tick(clockSeconds()))
     reports_.attempt([&] { showFilm(film_.film()->functionsChange()); });
@@ -323,6 +332,7 @@ void CacheView::apply(const PanelActions& actions) {
   for (const Command command : actions.commands) run(command);
   if (actions.scalar) chooseScalar(*actions.scalar);
   if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
+  if (actions.draw_isosurfaces_of) drawIsosurfacesOf(*actions.draw_isosurfaces_of);
   if (actions.automatic_function) run(Command::kResetFunction);
   if (actions.automatic_opacities && state_.opacity_by)
     chooser_.ask({FunctionChooser::For::kOpacities, state_.opacity_by->variable});
@@ -379,16 +389,21 @@ double CacheView::wait() const {
 void CacheView::keepHistory() {
   if (rests_ || changed_ || was_moving_ || ImGui::IsAnyItemActive()) return;
   rests_ = true;
-  history_.record(state_);
+  history_.record(state_, film_);
 }
 
-void CacheView::restore(const ViewState* state) {
-  if (!state) return;
+void CacheView::restore(const ViewState& state) {
   chooser_.drop();
-  state_ = *state;
+  state_ = state;
   takeBars();
   ++function_version_;
   changed_ = true;
+}
+
+void CacheView::restore(const History::Entry* entry) {
+  if (!entry) return;
+  film_.goBackTo(*entry->film);
+  restore(entry->state);
 }
 
 std::shared_ptr<const CarriedView> CacheView::carriedTo(const PreparedView& next) const {
@@ -397,7 +412,7 @@ std::shared_ptr<const CarriedView> CacheView::carriedTo(const PreparedView& next
     return std::make_shared<const CarriedView>(CarriedView{state_, history_});
   ViewState state = state_;
   leaveOtherScalars(state, next.cache.manifest(), next.scalar);
-  return std::make_shared<const CarriedView>(CarriedView{state, History(state)});
+  return std::make_shared<const CarriedView>(CarriedView{state, History(state, {})});
 }
 
 bool CacheView::isOf(const CacheReader& cache) const {
@@ -419,6 +434,7 @@ std::optional<WantedScalar> CacheView::takeWantedScalar(bool is_busy) {
 }
 
 void CacheView::remember() const {
+  rememberFilm();
   if (isUntouchedPreview()) return;
   const auto file = rememberedStateOf(whole());
   if (!file) return;

@@ -24,6 +24,7 @@
 #include "tools/view/film_edit.h"
 #include "tools/view/first_view.h"
 #include "tools/view/frame_loop.h"
+#include "tools/view/history.h"
 #include "tools/view/picture_layout.h"
 #include "tools/view/playback.h"
 #include "tools/view/view_state.h"
@@ -85,7 +86,7 @@ class CacheView {
 
   /// Seconds until the next frame is due without input.
   double wait() const;
-  /// Saves the state for the next time; that of a preview only if the user has changed it.
+  /// Saves the state and the film for the next time; those of a preview only if the user has changed them.
   void remember() const;
 
   /// The settings of this view that another view of the same grid takes over: all but those that name scalars which the
@@ -129,6 +130,7 @@ class CacheView {
   void readSurface(const std::filesystem::path& file);
   void takeSurface();
   void colourFaces(const std::string& scalar);
+  void drawIsosurfacesOf(const std::string& scalar);
   void findIsosurface(const std::string& scalar, std::optional<size_t> replaced = {});
   void takeIsosurfaces();
   void saveMovieTo(const std::filesystem::path& file, ImageSize size,
@@ -139,7 +141,9 @@ class CacheView {
   ViewState stateOfFilm() const;
   void showFilm(bool whole_function);
   void playFilm();
+  void takeFilm(const Film& film);
   void openFilm(const std::filesystem::path& file);
+  void rememberFilm() const;
   void drawFilmPictures();
   MovieRequest filmMovie(const std::filesystem::path& file, std::vector<double> times) const;
   std::optional<double> seriesTime() const;
@@ -164,7 +168,8 @@ class CacheView {
   bool isSeenAt(const Click& click) const;
   void drawStatus(const WindowLayout& layout);
   void keepHistory();
-  void restore(const ViewState* state);
+  void restore(const ViewState& state);
+  void restore(const History::Entry* entry);
   void savePictureIfFinal();
   std::string timeOption(bool of_film) const;
   void copyCommand(MovieKind what);
@@ -221,6 +226,7 @@ class CacheView {
   std::optional<MovieRequest> wanted_movie_;
 
   FilmEdit film_;
+  std::shared_ptr<const Film> first_film_;            // that is kept already
   std::map<uint64_t, PictureTexture> film_pictures_;  // by FilmEdit::Key::picture
   struct FilmPicturesJob;
   std::shared_ptr<FilmPicturesJob> film_job_;  // draws those that are missing

@@ -42,7 +42,7 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
       {Command::kCopyFilmCommand, [](View& v) { v.copyLater(MovieKind::kFilm); }, kHasFilm},
       {Command::kUndo,
        [](View& v) {
-         v.history_.record(v.state_);  // a movement that has not come to rest is undone as a whole
+         v.history_.record(v.state_, v.film_);  // a movement that has not come to rest is undone as a whole
          v.restore(v.history_.undo());
        },
        [](const View& v) { return v.history_.canUndo() || !v.rests_; }},
@@ -134,19 +134,12 @@ void CacheView::addPlaneTo(std::vector<ListedPlane>& planes) {
 
 /// Finds a value of a scalar whose isosurface lies in what is seen, on another thread: it reads the histogram.
 void CacheView::findIsosurface(const std::string& scalar, std::optional<size_t> replaced) {
-  const size_t variable = cache_.variableNamed(scalar);
-  const VariableInfo& info = manifest().variables[variable];
-  EditedFunction function(kMapsOnDark.sequential, info.min, info.max, state_.function.opacityUnit());
-  if (state_.opacityScalar() == scalar)
-    function = state_.opacity_by ? state_.opacity_by->function : state_.function;
   finding_isosurfaces_.push_back(std::async(
-      std::launch::async,
-      [cache = cache_.at(playback_.position()), variable, scalar, replaced, function = std::move(function),
-       before = replaced ? state_.isosurfaces.at(*replaced) : Isosurface{}] {
+      std::launch::async, [cache = cache_.at(playback_.position()), state = state_, scalar, replaced,
+                           before = replaced ? state_.isosurfaces.at(*replaced) : Isosurface{}] {
         nameThisThread("isosurface");
         const WakeAtEnd at_the_end;
-        const double value = middleOfSeen(histogramOf(cache, variable, function, kHistogramBins), function);
-        return FoundIsosurface{{scalar, value}, replaced, before};
+        return FoundIsosurface{{scalar, firstIsovalue(cache, state, scalar)}, replaced, before};
       }));
 }
 

@@ -3,9 +3,11 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include "stream/base/error.h"
+#include "tools/view/saved_views.h"
 #include "tools/viewer/cache_view.h"
 
 namespace curvisplat {
@@ -62,6 +64,7 @@ void CacheView::apply(const FilmActions& actions) {
   if (actions.move) film_.move(actions.move->first, actions.move->second);
   if (actions.select) film_.goTo(film_.keys()[*actions.select].frame.time);
   if (actions.go_to) film_.goTo(*actions.go_to);
+  if (actions.add || actions.replace || actions.remove || actions.move) rests_ = false;
   if (actions.remove || actions.select || actions.go_to) showFilm(true);
 }
 
@@ -103,13 +106,31 @@ void CacheView::playFilm() {
   showFilm(true);
 }
 
-void CacheView::openFilm(const std::filesystem::path& file) {
-  const Film film = Film::fromFile(file);
+/// Takes a film's key frames. Shows none of them.
+void CacheView::takeFilm(const Film& film) {
   ViewState state = state_;
   if (!film.scalar().empty() && film.scalar() != state.variable)
     chooseVariable(state, manifest(), film.scalar());
   film_.open(film, state, seriesTime());
+}
+
+void CacheView::openFilm(const std::filesystem::path& file) {
+  takeFilm(Film::fromFile(file));
   showFilm(true);
+}
+
+/// Keeps the film for the next time, if it is another one than before.
+void CacheView::rememberFilm() const {
+  const auto file = rememberedFilmOf(whole());
+  if (!file || film_.film() == first_film_) return;
+  try {
+    if (film_.film())
+      writeState(*file, film_.film()->toJson());
+    else
+      std::filesystem::remove(*file);
+  } catch (const std::exception& error) {
+    printMessage("warning: cannot save the film: {}", error.what());
+  }
 }
 
 MovieRequest CacheView::filmMovie(const std::filesystem::path& file, std::vector<double> times) const {

@@ -32,7 +32,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMaxNamedFiles = 4;        // in a command; of a longer series its kept cache
+constexpr size_t kMaxNamedFiles = 4;  // in a command; of a longer series its kept cache
+constexpr const char* kNoData = "no data here";
 constexpr double kPointedForSeconds = 0.3;  // the mouse rests that long before values are looked for
 
 ImVec2 toImGui(double x, double y) {
@@ -142,7 +143,7 @@ void CacheView::probe(const WindowLayout& layout) {
       if (const auto asked = question(pixelAt(*pointed)))
         probe_.ask(*asked);
       else
-        probed_.clear();
+        probed_ = kNoData;
     }
   }
   std::optional<PointProbe::Answer> answer;
@@ -157,7 +158,7 @@ void CacheView::probe(const WindowLayout& layout) {
   const bool for_marker = marker_question_ && *marker_question_ == answer->question;
   if (for_marker) marker_question_.reset();
   if (!answer->found) {
-    probed_ = "outside of the data";
+    probed_ = kNoData;
     return;
   }
   const Marker marker = markerOf(state_, variable, answer->question.point, *answer->found);
@@ -384,7 +385,7 @@ void CacheView::loadView(const std::string& name) {
     ViewState state = viewStateFromJson(readTextFile(file), file, manifest());
     loadSurfaces(state);
     state.given = state_.given;
-    restore(&state);
+    restore(state);
   } catch (const Error& error) {
     reports_.report(error);
   }
@@ -446,7 +447,8 @@ void CacheView::showScalar(const std::string& name) {
 
 void CacheView::chooseOpacityScalar(const std::string& name) {
   using For = FunctionChooser::For;
-  const std::string& shown = state_.opacity_by ? state_.opacity_by->variable : state_.variable;
+  state_.opacities_before.reset();
+  const std::string& shown = state_.opacityScalar();
   const bool is_shown = (name.empty() ? state_.variable : name) == shown;
   if (!is_shown && !name.empty() && name != state_.variable) return chooser_.ask({For::kOpacities, name});
   chooser_.drop(For::kOpacities);  // one that was chosen before
@@ -454,6 +456,14 @@ void CacheView::chooseOpacityScalar(const std::string& name) {
   state_.opacity_by.reset();
   ++function_version_;
   changed_ = true;
+}
+
+/// Gives the volume the opacities of the scalar, whose isosurfaces are drawn then.
+void CacheView::drawIsosurfacesOf(const std::string& scalar) {
+  state_.takeOpacitiesFor(scalar);
+  const auto before = state_.opacities_before;
+  chooseOpacityScalar(scalar == state_.variable ? "" : scalar);
+  state_.opacities_before = before;
 }
 
 void CacheView::addFaces(const std::string& name) {

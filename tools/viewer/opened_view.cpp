@@ -30,7 +30,7 @@ bool JobDisplay::draw(const BackgroundJob& job, const std::string& name, const s
   ImGui::ProgressBar(job.part(), {-1, 0}, job.phase().c_str());
   ImGui::PopStyleColor();
   nameWidget(name);
-  const bool stops = ImGui::Button("stop");
+  const bool stops = ImGui::Button("Stop");
   nameWidget("stop " + name);
   below_ += ImGui::GetWindowSize().y + 0.5f * unit;
   ImGui::End();

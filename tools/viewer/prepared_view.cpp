@@ -60,6 +60,18 @@ std::vector<std::string> scalarsElsewhere(const CacheReader& cache) {
   return names;
 }
 
+/// The film that was made when the cache was shown last; nullopt without one.
+std::optional<Film> rememberedFilm(const fs::path& whole) {
+  const auto file = rememberedFilmOf(whole);
+  if (!file || !fs::exists(*file)) return std::nullopt;
+  try {
+    return Film::fromFile(*file);
+  } catch (const Error& error) {
+    printMessage("warning: {}; the film is left out", error.what());
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 std::string wantedScalar(const ViewerOptions& options) {
@@ -96,7 +108,9 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   std::vector<std::string> faces;
   if (options.faces.names) faces = options.faces.names(cache);
   std::vector<std::string> elsewhere = scalarsElsewhere(cache);
-  return {std::move(cache), std::move(state), scalar, automatic, std::move(faces), std::move(elsewhere)};
+  std::optional<Film> film = rememberedFilm(whole);
+  return {std::move(cache), std::move(state),     scalar,         automatic,
+          std::move(faces), std::move(elsewhere), std::move(film)};
 }
 
 }  // namespace curvisplat

@@ -14,6 +14,7 @@
 
 #include "render/backend/backend.h"
 #include "render/camera/camera.h"
+#include "render/film/film.h"
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/view/background_jobs.h"
@@ -67,6 +68,7 @@ struct PreparedView {
   EditedFunction automatic;             // was chosen from the data
   std::vector<std::string> face_names;  // that the list of surfaces offers
   std::vector<std::string> elsewhere;   // scalars of the whole cache that have values at other samples
+  std::optional<Film> film;             // that was made of it before
 };
 
 /// The scalar to show first: the one that the options name, or that of their state; empty for any. A state that cannot be read

@@ -58,7 +58,7 @@ Look lookOf(FileDialog::Purpose purpose) {
     case FileDialog::Purpose::kSaveFilm:
       return {"Save film", "save", true, {".json"}};
     case FileDialog::Purpose::kSaveMovie:
-      return {"Save movie", "save", true, {".mp4", ".gif", ".html", ".png"}};
+      return {"Save film", "save", true, {".mp4", ".gif", ".html", ".png"}};
   }
   return {"", ""};
 }
@@ -165,11 +165,11 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   }
   window.cover({0, 0, static_cast<double>(whole.x), static_cast<double>(whole.y)});
   bool accepts = false;
-  if (ImGui::Button("up")) enter(folder_.parent_path());
+  if (ImGui::Button("Up")) enter(folder_.parent_path());
   nameWidget("file up");
   ImGui::SameLine();
   const char* const home = std::getenv("HOME");
-  if (home && ImGui::Button("home")) enter(home);
+  if (home && ImGui::Button("Home")) enter(home);
   if (home) ImGui::SameLine();
   ImGui::TextUnformatted(folder_.c_str());
   help_ ? drawHelp(look.saves) : drawEntries(accepts);
@@ -186,7 +186,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   accepts |= ImGui::Button(look.button);
   nameWidget("file accept");
   ImGui::SameLine();
-  bool cancels = ImGui::Button("cancel");
+  bool cancels = ImGui::Button("Cancel");
   nameWidget("file cancel");
   if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) cancels |= !std::exchange(help_, false);
   ImGui::SameLine();
