@@ -186,7 +186,7 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
   refuses(R"({"type": "histogram", "cache": 0, "scalar": "a", "low": 0, "high": 2, "log": true})", "low");
   refuses(
       R"({"type": "colours", "map": "grey", "parts": {"map": "grey", "range": [3, 1], "opacity_unit": 2}})",
-      "range");
+      "parts.range");
   refuses(R"({"type": "isosurface", "cache": 0, "step": 4, "scalar": "f"})", "state");
   refuses(R"({"type": "colours", "map": ")" + std::string(1001, 'a') + R"("})", "map");
   refuses(R"({"type": "pick", "x": 0, "y": 1, "hovers": 1})", "hovers");

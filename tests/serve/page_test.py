@@ -363,10 +363,10 @@ def sizes(tab):
         stage = tab.run("(() => { const r = document.getElementById('stage').getBoundingClientRect(); return [r.width, r.height]; })()")
         header = tab.run(f"[{PAGE}.header.width, {PAGE}.header.height]")
         expect(all(abs(a * ratio - b) <= 1 for a, b in zip(stage, header)), f"a page of {width}x{height}: {stage}, {header}")
-        # A narrow picture shows as much of the data's width as a usual one does.
+        # A narrow picture shows as much of the data's width as a usual one does, but for what its scalar bar takes.
         scale, usual = tab.run(f"[{PAGE}.state.camera.parallel_scale / Math.max(1, cache.shape / shapeOf()), cache.shape]")
         widths.append(scale)
-        expect(max(widths) < 1.1 * min(widths), f"the data keep their width: {widths}, of a shape of {usual}")
+        expect(max(widths) < 1.2 * min(widths), f"the data keep their width: {widths}, of a shape of {usual}")
     expect(abs(tab.run(f"{PAGE}.state.camera.parallel_scale") / first - 1) < 0.1, f"and come back as they were: {widths}")
     # A phone: one finger rotates, two zoom and move.
     tab.resize(390, 844, 2, mobile=True)
