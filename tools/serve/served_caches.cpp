@@ -217,7 +217,13 @@ std::string ServedCaches::isosurfaceText(const IsosurfaceRequest& request) const
   const CacheReader& reader = cache.reader;
   variableOf(reader, cache.name, request.scalar);
   if (request.step >= reader.series().steps.size()) throw UsageError("there is no step {}", request.step);
-  const ViewState state = viewStateFromJson(request.state, "view", reader.manifest());
+  const ViewState state = [&] {
+    try {
+      return viewStateFromJson(request.state, "view", reader.manifest());
+    } catch (const Error& error) {
+      throw UsageError("{}", error.what());  // the viewer's fault, which the server does not report
+    }
+  }();
   const MutexLock lock(reading_);
   const double value = firstIsovalue(reader.atStep(request.step), state, request.scalar);
   return textOf(

@@ -76,7 +76,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       state_(firstState(prepared, options)),
       first_function_(state_.function),
       first_state_(options.carried ? "" : toJson(state_)),
-      history_(options.carried ? options.carried->history : History(state_, {})),
+      history_(options.carried && options.carried->history ? *options.carried->history : History(state_, {})),
       panels_(cache_),
       playback_(cache_.series().steps.size(), joinedSteps(cache_.series())),
       backend_(options.backend),
@@ -92,8 +92,8 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
   setBounds();
   if (!prepared.film) return;
   reports_.attempt([&] { takeFilm(*prepared.film); });
-  first_film_ = film_.film();
-  if (!options.carried) history_ = History(state_, film_);
+  kept_film_ = film_.film();
+  if (!options.carried || !options.carried->history) history_ = History(state_, film_);
 }
 
 /// Keys show what the clip box leaves.
@@ -123,10 +123,11 @@ void CacheView::takeRequestsOf(CacheView& before) {
   save_to_ = std::exchange(before.save_to_, std::nullopt);
   copy_requested_ = std::exchange(before.copy_requested_, std::nullopt);
   wanted_scalar_ = std::exchange(before.wanted_scalar_, std::nullopt);
-  if (hasScalarsOf(manifest(), before.manifest())) chooser_.takeQuestionsOf(before.chooser_);
-  if (before.playback_.steps() != playback_.steps()) return;
-  playback_ = before.playback_;
-  if (hasScalarsOf(manifest(), before.manifest())) film_ = before.film_;
+  if (hasScalarsOf(manifest(), before.manifest())) {
+    chooser_.takeQuestionsOf(before.chooser_);
+    film_ = before.film_;
+  }
+  if (before.playback_.steps() == playback_.steps()) playback_ = before.playback_;
 }
 
 /// The state that the view before has now, if there is one. Reads only where the user has chosen another
@@ -412,7 +413,7 @@ std::shared_ptr<const CarriedView> CacheView::carriedTo(const PreparedView& next
     return std::make_shared<const CarriedView>(CarriedView{state_, history_});
   ViewState state = state_;
   leaveOtherScalars(state, next.cache.manifest(), next.scalar);
-  return std::make_shared<const CarriedView>(CarriedView{state, History(state, {})});
+  return std::make_shared<const CarriedView>(CarriedView{state, std::nullopt});
 }
 
 bool CacheView::isOf(const CacheReader& cache) const {

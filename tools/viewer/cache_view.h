@@ -48,7 +48,7 @@ struct WindowLayout {
 /// added.
 struct CarriedView {
   ViewState state;
-  History history;
+  std::optional<History> history;  // none where the scalars are others
 };
 
 class CacheView {
@@ -226,7 +226,7 @@ class CacheView {
   std::optional<MovieRequest> wanted_movie_;
 
   FilmEdit film_;
-  std::shared_ptr<const Film> first_film_;            // that is kept already
+  mutable std::shared_ptr<const Film> kept_film_;     // as its file has it
   std::map<uint64_t, PictureTexture> film_pictures_;  // by FilmEdit::Key::picture
   struct FilmPicturesJob;
   std::shared_ptr<FilmPicturesJob> film_job_;  // draws those that are missing

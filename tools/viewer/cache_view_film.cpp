@@ -122,12 +122,13 @@ void CacheView::openFilm(const std::filesystem::path& file) {
 /// Keeps the film for the next time, if it is another one than before.
 void CacheView::rememberFilm() const {
   const auto file = rememberedFilmOf(whole());
-  if (!file || film_.film() == first_film_) return;
+  if (!file || film_.film() == kept_film_) return;
   try {
     if (film_.film())
       writeState(*file, film_.film()->toJson());
     else
       std::filesystem::remove(*file);
+    kept_film_ = film_.film();
   } catch (const std::exception& error) {
     printMessage("warning: cannot save the film: {}", error.what());
   }
