@@ -192,6 +192,14 @@ std::optional<PieceSplat> splatOfPiece(const CollapsedNode& node, std::span<cons
   const DualPiece piece = dualPiece(node.nodes, node.at, node.strides, node.there, true);
   PieceSplat out;
   const glm::dvec3 middle = piece.first / piece.volume;
+  // Cells of opposite handedness cancel each other, as where latitudes go on beyond a pole: the rest is no piece.
+  double reach = 0;
+  for (size_t axis = 0; axis < 3; ++axis)
+    reach += std::max(glm::distance(node.nodes.position(node.at),
+                                    node.nodes.position(node.at + node.neighbours.after[axis])),
+                      glm::distance(node.nodes.position(node.at),
+                                    node.nodes.position(node.at + node.neighbours.before[axis])));
+  if (!(glm::length(middle) <= reach)) return std::nullopt;
   const auto spread = [&](size_t n, double product) {
     return 12 * (piece.second[n] / piece.volume - product);
   };
@@ -206,6 +214,11 @@ std::optional<PieceSplat> splatOfPiece(const CollapsedNode& node, std::span<cons
   for (size_t axis = 0; axis < 3; ++axis)
     steps[static_cast<int>(axis)] = 0.5 * (node.nodes.position(node.at + node.neighbours.after[axis]) -
                                            node.nodes.position(node.at + node.neighbours.before[axis]));
+  // Nodes at a pole that differ by rounding alone have no direction from one to the other.
+  double longest = 0;
+  for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, glm::length(steps[axis]));
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(glm::length(steps[axis]) > kCollapsed * longest)) steps[axis] = glm::dvec3(0.0);
   std::array<glm::dvec3, 3> ends{};
   size_t count = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -216,11 +229,6 @@ std::optional<PieceSplat> splatOfPiece(const CollapsedNode& node, std::span<cons
   }
   out.border_code = count > 0 ? packBorderCode({ends.data(), count}, (1u << count) - 1) : kNoBorder;
 
-  // Nodes at a pole that differ by rounding alone have no direction from one to the other.
-  double longest = 0;
-  for (int axis = 0; axis < 3; ++axis) longest = std::max(longest, glm::length(steps[axis]));
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(glm::length(steps[axis]) > kCollapsed * longest)) steps[axis] = glm::dvec3(0.0);
   const LatticeGradient gradient_of(steps);
   const glm::dmat3 factor = out.splat.factor();
   for (size_t v = 0; v < scalars.size(); ++v) {

@@ -26,10 +26,10 @@ glm::dvec3 inFootprint(const SplatGeometry& g, size_t s, const glm::dvec3& d) {
   return {b0 / g.axis0[s], b1 / g.axis1[s], b2 / g.axis2[s]};
 }
 
-/// Whether a point at `offset` from a splat's centre, in its footprint, is beyond the border where the splat's cell ends. Cells are not
-/// quite what the code says, so a point within a tenth of the cell beyond it counts as inside.
+/// Whether a point at `offset` from a splat's centre, in its footprint, is beyond the border where the splat's cell ends. Walls that
+/// bend are not the code's planes, so a point within a quarter of a cell beyond it counts as inside.
 bool isBeyondBorder(uint32_t border_code, const glm::dvec3& offset) {
-  constexpr double kTolerance = 0.1;
+  constexpr double kTolerance = 0.5;
   if (border_code == kNoBorder) return false;
   const InwardAxes inward = inwardAxes(border_code);
   for (int n = 0; n < inward.count; ++n)
@@ -110,13 +110,13 @@ void addSplat(const CacheReader& reader, const Leaf& leaf, uint32_t s, const glm
   }
 }
 
-/// The result from what is known of a point: nothing where it is beyond the borders of all blocks whose splats reach it.
+/// The result from what is known of a point: nothing where no splat reaches it.
 std::optional<ProbeResult> resultOf(const CacheReader& reader, std::span<const size_t> variables,
                                     Probed&& probed) {
-  if (std::all_of(probed.near.begin(), probed.near.end(),
-                  [](const NearestOfBlock& block) { return block.is_beyond; }))
-    return std::nullopt;
+  if (!probed.nearest) return std::nullopt;
   ProbeResult result = std::move(*probed.nearest);
+  result.is_beyond = std::all_of(probed.near.begin(), probed.near.end(),
+                                 [](const NearestOfBlock& block) { return block.is_beyond; });
   for (const NearestOfBlock& block : probed.near) result.near.push_back(block.sample);
   std::sort(result.near.begin(), result.near.end(),
             [](const ReachingSample& a, const ReachingSample& b) { return a.distance < b.distance; });

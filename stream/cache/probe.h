@@ -36,11 +36,11 @@ struct ProbeResult {
   double distance = 0;     // |A⁻¹(x - μ)|: 0 at the splat's centre, 1.556 at the edge of its support
   std::vector<ProbeVariable> variables;  // in the order of the argument
   std::vector<ReachingSample> near;      // the nearest of each block, the nearest block first
+  bool is_beyond = false;  // the borders where the cells of these end, by more than a quarter of a cell
 };
 
-/// [point]: the leaf splat with the smallest `distance` from it; nullopt if no splat's support contains the point, or if it is beyond the
-/// border where the nearest splat's cell ends, by more than a tenth of that cell. Where a scalar is linear, its value is exact; none is
-/// outside of the manifest's range. Decodes the leaves whose splats may reach a point, each once. `variables`: indices in
+/// [point]: the leaf splat with the smallest `distance` from it; nullopt if no splat's support contains the point. Where a scalar is linear, its value
+/// is exact; none is outside of the manifest's range. Decodes the leaves whose splats may reach a point, each once. `variables`: indices in
 /// manifest().variables. Throws as CacheReader.
 std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader, std::span<const size_t> variables,
                                                  std::span<const glm::dvec3> points);

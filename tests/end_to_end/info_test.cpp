@@ -100,7 +100,7 @@ TEST_F(InfoOfACache, ProbesAFileOfPoints) {
                 {"points.csv", "line 2"});
 }
 
-/// Nodes of a lattice, and x: a point that is more than a twentieth of a cell beyond a border is outside.
+/// Nodes of a lattice, and x: a point that is more than a quarter of a cell beyond a border is outside.
 TEST_F(InfoOfACache, EndsAtTheBordersOfTheGrid) {
   std::string values;
   for (int n = 0; n < 6 * 6 * 6; ++n) values += fmt::format("{}\n", n % 6);
@@ -118,7 +118,7 @@ TEST_F(InfoOfACache, EndsAtTheBordersOfTheGrid) {
   };
   for (int axis = 0; axis < 3; ++axis)
     for (const auto& [along, status] :
-         {std::pair(0.02, 0), {4.98, 0}, {-0.1, 1}, {5.1, 1}, {-0.3, 1}, {5.4, 1}})
+         {std::pair(0.02, 0), {4.98, 0}, {-0.3, 1}, {5.3, 1}, {-0.4, 1}, {5.4, 1}})
       EXPECT_EQ(statusAt(along, axis), status) << along << " along " << axis;
   const auto probe =
       nlohmann::json::parse(run({"info", folder_ / "x.splats", "--json", "--probe=-0.03,2,2"}).out)["probe"];

@@ -141,7 +141,7 @@ std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
     return all;
   }
   for (size_t p = 0; p < points.size(); ++p) {
-    if (!found[p]) continue;
+    if (!found[p] || found[p]->is_beyond) continue;
     const ProbeResult& at = *found[p];
     all[p] = {at.block, at.i, at.j, at.k, at.centre, {}, {}, at.distance};
     for (const ProbeVariable& variable : at.variables) {

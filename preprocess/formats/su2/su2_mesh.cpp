@@ -192,17 +192,17 @@ void MeshParser::endZone() {
 
 std::vector<Su2Zone> MeshParser::run() {
   while (nextLine()) {
-    if (valueOf("NZONE")) {
-      writer_.reset();
-      continue;
-    }
+    const auto has_begun = [&] { return writer_ && writer_->points() + writer_->cells() > 0; };
     if (valueOf("IZONE")) {
-      endZone();
+      // A file of several zones may have NDIME once, before NZONE.
+      if (has_begun()) {
+        endZone();
+        writer_.emplace(spools_);
+      }
       continue;
     }
     if (const auto value = valueOf("NDIME")) {
-      // A file of several zones may have NDIME before NZONE, too.
-      if (writer_ && writer_->points() + writer_->cells() > 0) endZone();
+      if (has_begun()) endZone();
       if (count(*value) != 3)
         throw Error("{}: is a mesh of {} dimensions (NDIME); expected 3", text_.file().name(), count(*value));
       writer_.emplace(spools_);
