@@ -1,5 +1,6 @@
 #include "render/backend/backend.h"
 
+#include <exception>
 #include <utility>
 
 #include "render/cpu/cpu_painter.h"
@@ -116,16 +117,14 @@ std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
 }
 
 void replaceFailed(std::unique_ptr<PaintingBackend>& backend, const std::string& why) {
-  const bool has_quads = backend->next() == Backend::kEglQuads;
-  backend.reset();
-  if (has_quads) {
-    try {
-      backend = std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kQuads, why);
-      return;
-    } catch (const Error&) {  // the processor always draws
-    }
+  const bool has_quads = backend->next() == Backend::kEglQuads, was_software = backend->isSoftware();
+  backend = std::make_unique<CpuBackend>(why);  // which always draws; and the other one's memory is free
+  if (!has_quads) return;
+  try {
+    auto quads = std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kQuads, why);
+    if (was_software || !quads->isSoftware()) backend = std::move(quads);
+  } catch (const std::exception&) {  // whatever it is, the processor draws
   }
-  backend = std::make_unique<CpuBackend>(why);
 }
 
 SystemReport examineBackends() {

@@ -47,8 +47,8 @@ class PaintingBackend {
 /// Throws Error if the backend is not available; the message names the library that was tried and its error.
 std::unique_ptr<PaintingBackend> makeBackend(Backend backend);
 
-/// Replaces a backend that OpenGL has failed by the next one that this machine has: quads instead of compute shaders, then the
-/// processor. Its name tells `why`.
+/// Replaces a backend that OpenGL has failed by the next one that this machine has: quads instead of compute shaders, unless it
+/// is software that would draw them in a card's place; then the processor. Its name tells `why`. The backend is never null.
 void replaceFailed(std::unique_ptr<PaintingBackend>& backend, const std::string& why);
 
 /// The result of trying one backend on this machine.
