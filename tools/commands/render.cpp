@@ -247,6 +247,11 @@ void render(const RenderArguments& given) {
                       options.background};
   // The grid and edges of the box lie behind the data, before the background.
   if (has_box) options.background = glm::vec4(0);
+  const auto noteBackend = [&] {
+    if (player.renderer().backendName() == report.backend) return;
+    report.backend = player.renderer().backendName();
+    printMessage("warning: OpenGL could not go on; drawn by {}", report.backend);
+  };
   const auto writeReport = [&] {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));
@@ -279,13 +284,11 @@ void render(const RenderArguments& given) {
                numbers, progress);
   } catch (const Interrupted& interrupted) {
     progress.end();
+    noteBackend();
     writeReport();
     throw Interrupted(interrupted.signal(), howFar(report, numbers.size(), severalFrames(arguments)));
   }
-  if (player.renderer().backendName() != report.backend) {
-    report.backend = player.renderer().backendName();
-    printMessage("warning: OpenGL could not go on; drawn by {}", report.backend);
-  }
+  noteBackend();
   if (!ranks.isFirst()) return;
   writeReport();
   printResult(report);
