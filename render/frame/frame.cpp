@@ -35,18 +35,21 @@ struct FrameRenderer::State {
         planner(cache_, scalars_),
         pipeline(cache_, scalars_, planner, std::move(backend)) {}
 
-  /// Draws by the next backend where one cannot go on. Ranks would have to agree on it.
+  /// Draws by the next backend where one cannot go on; where the card refuses memory, by the same with less, once. Ranks would
+  /// have to agree on it.
   template <typename Draw>
   Image withBackends(const FrameOptions& options, const Draw& draw) {
-    for (;;) {
+    for (bool may_give_up = true;; may_give_up = false) {
       std::string why;
+      bool of_memory = false;
       try {
         return draw();
       } catch (const PainterFailure& failure) {
         if (options.ranks) throw;
         why = failure.what();
+        of_memory = dynamic_cast<const CardMemoryFailure*>(&failure) != nullptr;
       }
-      pipeline.fallBack(why);
+      if (!of_memory || !may_give_up || !pipeline.giveCardMemoryUp()) pipeline.fallBack(why);
     }
   }
 
@@ -158,6 +161,10 @@ const std::string& FrameRenderer::backendName() const {
   return state_->pipeline.backend().name();
 }
 
+std::unique_ptr<PaintingBackend> FrameRenderer::takeBackend() {
+  return state_->pipeline.takeBackend();
+}
+
 bool FrameRenderer::drawsInSoftware() const {
   return state_->pipeline.backend().isSoftware();
 }
@@ -235,6 +242,20 @@ StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend 
       backend_(backend),
       renderer_(std::make_unique<FrameRenderer>(cache, scalars, backend)) {}
 
+StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars,
+                       std::unique_ptr<PaintingBackend> backend)
+    : cache_(cache),
+      scalars_(scalars),
+      renderer_(std::make_unique<FrameRenderer>(cache, scalars, std::move(backend))) {}
+
+/// Removes the renderer, which frees its memory and reads no more. Returns its backend, which may have replaced another.
+std::unique_ptr<PaintingBackend> StepPlayer::endRenderer() {
+  if (!renderer_) return makeBackend(backend_);  // the next one could not be made
+  std::unique_ptr<PaintingBackend> backend = renderer_->takeBackend();
+  renderer_.reset();
+  return backend;
+}
+
 void StepPlayer::setTransferFunction(const TransferFunction& transfer_function) {
   scalars_.opacity.function = transfer_function;
   renderer_->setTransferFunction(transfer_function);
@@ -243,8 +264,8 @@ void StepPlayer::setTransferFunction(const TransferFunction& transfer_function) 
 void StepPlayer::setFunctions(const DrawnScalars& scalars) {
   if (!scalars.colour) return setTransferFunction(scalars.opacity.function);
   scalars_ = scalars;
-  renderer_.reset();  // frees its memory before the next one allocates
-  renderer_ = std::make_unique<FrameRenderer>(cache_, scalars_, backend_);
+  std::unique_ptr<PaintingBackend> backend = endRenderer();
+  renderer_ = std::make_unique<FrameRenderer>(cache_, scalars_, std::move(backend));
 }
 
 void StepPlayer::goTo(const StepPosition& position) {
@@ -254,9 +275,9 @@ void StepPlayer::goTo(const StepPosition& position) {
     renderer_->changeStep([&] { cache_ = std::move(next); });
     return;
   }
-  renderer_.reset();  // reads the cache
+  std::unique_ptr<PaintingBackend> backend = endRenderer();
   cache_ = std::move(next);
-  renderer_ = std::make_unique<FrameRenderer>(cache_, scalars_, backend_);
+  renderer_ = std::make_unique<FrameRenderer>(cache_, scalars_, std::move(backend));
 }
 
 }  // namespace curvisplat

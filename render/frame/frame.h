@@ -110,6 +110,8 @@ class FrameRenderer {
   const std::string& backendName() const;
   /// Whether the processor draws, either directly or through a software OpenGL.
   bool drawsInSoftware() const;
+  /// The backend, for another renderer. This one can only be destroyed then.
+  std::unique_ptr<PaintingBackend> takeBackend();
 
  private:
   struct State;
@@ -122,6 +124,8 @@ class StepPlayer {
  public:
   /// `cache` must outlive the player; it is at the step that is drawn. Throws Error as FrameRenderer.
   StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend);
+  /// Draws by this backend, as long as it can.
+  StepPlayer(CacheReader& cache, const DrawnScalars& scalars, std::unique_ptr<PaintingBackend> backend);
 
   FrameRenderer& renderer() { return *renderer_; }
   /// Replaces the function of the opacities, for this step and those to come.
@@ -134,9 +138,11 @@ class StepPlayer {
   double time() const { return cache_.time(); }
 
  private:
+  std::unique_ptr<PaintingBackend> endRenderer();
+
   CacheReader& cache_;
   DrawnScalars scalars_;
-  const Backend backend_;
+  const Backend backend_ = Backend::kAutomatic;
   std::unique_ptr<FrameRenderer> renderer_;
 };
 

@@ -12,6 +12,7 @@
 #include "render/frame/frame_memory.h"
 #include "render/frame/frame_workers.h"
 #include "render/image/too_little_memory.h"
+#include "render/project/brick_store.h"
 #include "render/sweep/segment_ring.h"
 #include "render/sweep/sweep_buffer.h"
 #include "stream/base/compute_permits.h"
@@ -162,7 +163,8 @@ void FramePipeline::release() {
   dropPools();
 }
 
-void FramePipeline::fallBack(const std::string& why) {
+/// Forgets what a frame that failed has left, and what it has of the painter.
+void FramePipeline::forgetFrame() {
   endPrefetch();
   dropPools();
   hidden_.ask(nullptr);
@@ -170,8 +172,27 @@ void FramePipeline::fallBack(const std::string& why) {
   is_stored_.clear();
   unread_.clear();
   is_storing_ = false;
+}
+
+void FramePipeline::fallBack(const std::string& why) {
+  forgetFrame();
   replaceFailed(backend_, why);
   painting_ = backend_.get();
+}
+
+bool FramePipeline::giveCardMemoryUp() {
+  forgetFrame();
+  bool has_given = false;
+  backend_->run([&](Painter& painter) {
+    BrickStore* const store = painter.store();
+    has_given = store && store->giveMemoryUp();
+  });
+  return has_given;
+}
+
+std::unique_ptr<PaintingBackend> FramePipeline::takeBackend() {
+  forgetFrame();
+  return std::move(backend_);
 }
 
 void FramePipeline::stepChanged() {

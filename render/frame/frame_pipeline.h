@@ -139,15 +139,21 @@ class FramePipeline {
 
   /// Draws the frames to come by the next backend (replaceFailed()), after a PainterFailure. Nothing may be drawn meanwhile.
   void fallBack(const std::string& why);
+  /// Draws the frames to come with less of the card's memory, which is freed, after a CardMemoryFailure. False if it
+  /// kept nothing there that could go. Nothing may be drawn meanwhile.
+  bool giveCardMemoryUp();
 
   /// The cache is at another step of the same geometry. Nothing may be drawn or fetched meanwhile.
   void stepChanged();
 
   const PaintingBackend& backend() const { return *backend_; }
+  /// Ends a prefetch. The pipeline can only be destroyed then.
+  std::unique_ptr<PaintingBackend> takeBackend();
   /// See FrameRenderer::permits().
   ComputePermits* permits() const { return permits_.get(); }
 
  private:
+  void forgetFrame();
   struct Pools;
 
   void sample(const SamplingWork& work, const FrameOptions& options, FrameStatistics& statistics);

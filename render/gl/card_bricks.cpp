@@ -6,13 +6,14 @@
 #include <queue>
 #include <utility>
 
+#include "render/project/painter_failure.h"
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kWordBytes = sizeof(uint32_t);
+constexpr uint64_t kWordBytes = sizeof(uint32_t), kMinPageBytes = uint64_t{64} << 10;
 
 constexpr uint64_t kSplatWords = sizeof(BrickPieces::Splat) / kWordBytes,
                    kPieceWords = sizeof(StoredPiece) / kWordBytes,
@@ -107,21 +108,49 @@ CardBricks::Room CardBricks::roomFor(std::span<const StoredPart> parts, uint64_t
   return room;
 }
 
-size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes) {
+size_t CardBricks::makeRoom(std::span<const StoredPart> parts, uint64_t bytes, CardBuffer& splats,
+                            uint64_t other_bytes) {
   places_.beginFrame();
-  Room room = roomFor(parts, bytes);
   for (;;) {
-    most_page_bytes_ = std::min(granted_bytes_, bytes - std::min(bytes, room.drawn_bytes));
+    const Room room = roomFor(parts, bytes);
     const std::span<const StoredPart> fitting = parts.first(room.parts);
     for (const StoredPart& part : fitting) {
       places_.need(geometryOf(part.brick));
       places_.need(valuesOf(part.brick));
     }
-    if (makePages(fitting, room)) break;
-    room = roomFor(parts, bytes);  // the card has refused memory
+    if (!makeSplats(room, bytes, splats, other_bytes) || !makePages(fitting, room)) continue;
+    slab_elements_ = room.drawn_bytes / sizeof(ScreenSplat);
+    return room.parts;
   }
-  slab_elements_ = room.drawn_bytes / sizeof(ScreenSplat);
-  return room.parts;
+}
+
+/// Makes `splats` as large as the room needs it, before pages take what is left. It is made smaller only if it leaves the
+/// room's pages too little of `bytes`. False if the card refuses memory, of which granted_bytes_ tells afterwards.
+bool CardBricks::makeSplats(const Room& room, uint64_t bytes, CardBuffer& splats, uint64_t other_bytes) {
+  const auto drawn_bytes = [&] { return splats.bytes() - std::min(splats.bytes(), other_bytes); };
+  if (drawn_bytes() > bytes - room.page_bytes) splats.release();
+  if (room.parts > 0) {
+    try {
+      splats.reserve(std::min(room.drawn_bytes + other_bytes, CardBuffer::largest(gl_)));
+    } catch (const CardMemoryFailure&) {
+      takeAtMost(std::max(room.page_bytes, pageBytes()) / 2);
+      return false;
+    }
+  }
+  most_page_bytes_ = std::min(granted_bytes_, bytes - std::min(bytes, drawn_bytes()));
+  return true;
+}
+
+/// Removes all pages. They have no more bytes from now on, and none if these are few.
+void CardBricks::takeAtMost(uint64_t bytes) {
+  granted_bytes_ = std::min(granted_bytes_, bytes < kMinPageBytes ? 0 : bytes);
+  removePagesBeyond(0);
+}
+
+bool CardBricks::giveMemoryUp() {
+  const uint64_t bytes = pageBytes();
+  takeAtMost(bytes / 2);
+  return bytes > 0;
 }
 
 /// False if the card refuses memory, of which granted_bytes_ tells afterwards.
@@ -132,10 +161,13 @@ bool CardBricks::makePages(std::span<const StoredPart> parts, const Room& room) 
       if (!addPage(room.page_bytes - pageBytes())) return false;
     return true;
   };
-  if (!is_scattered_ && pageBytes() <= most_page_bytes_ && grow()) return true;
-  if (granted_bytes_ < granted) return false;
+  if (!is_scattered_) {
+    removePagesBeyond(most_page_bytes_);
+    if (grow()) return true;
+    if (granted_bytes_ < granted) return false;
+  }
   is_scattered_ = false;
-  removePages();
+  removePagesBeyond(0);
   if (!grow()) return false;
   keepPlaces(parts);
   return true;
@@ -160,8 +192,8 @@ bool CardBricks::addPage(uint64_t wanted_bytes) {
     pages_.emplace_back(gl_).reserve(bytes);
   } catch (const Error&) {
     pages_.pop_back();
-    constexpr uint64_t kMinPageBytes = uint64_t{64} << 10;
     granted_bytes_ = pageBytes() + (bytes > kMinPageBytes ? bytes / 2 : 0);
+    most_page_bytes_ = std::min(most_page_bytes_, granted_bytes_);
     return false;
   }
   places_.addPage(bytes / kWordBytes);
@@ -174,9 +206,13 @@ uint64_t CardBricks::pageBytes() const {
   return sum;
 }
 
-void CardBricks::removePages() {
-  places_.removePages();
-  pages_.clear();
+/// Removes the last pages, until the others have no more bytes.
+void CardBricks::removePagesBeyond(uint64_t bytes) {
+  if (bytes == 0) places_.clear();
+  while (pageBytes() > bytes) {
+    places_.removeLastPage();
+    pages_.pop_back();
+  }
 }
 
 /// A free place, for which pages may be added, and items may go that are not needed.

@@ -39,7 +39,10 @@ class CardBricks {
   void compile();
   /// The functions of BrickStore (render/project/brick_store.h).
   void open(uint64_t content, const StepPosition& step);
-  size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes);
+  /// makeRoom() also makes `splats` large enough for project(), with `other_bytes` behind, which are no part of `bytes`.
+  size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes, CardBuffer& splats,
+                  uint64_t other_bytes);
+  bool giveMemoryUp();
   bool has(uint32_t brick) const;
   void put(const StoredPart& part, const GeometryArrays<const float>& geometry, const BrickValues& values,
            const BrickPieces& pieces);
@@ -83,11 +86,13 @@ class CardBricks {
   template <typename T>
   void write(const CardPlaces::Place& place, uint64_t& at, std::span<const T> some);
   Room roomFor(std::span<const StoredPart> parts, uint64_t bytes) const;
+  bool makeSplats(const Room& room, uint64_t bytes, CardBuffer& splats, uint64_t other_bytes);
   bool makePages(std::span<const StoredPart> parts, const Room& room);
   void keepPlaces(std::span<const StoredPart> parts);
   bool addPage(uint64_t wanted_bytes);
   uint64_t pageBytes() const;
-  void removePages();
+  void removePagesBeyond(uint64_t bytes);
+  void takeAtMost(uint64_t bytes);
   std::optional<CardPlaces::Place> placeFor(const CardPlaces::Item& item, uint64_t words);
   void putGeometry(const CardPlaces::Place& place, const GeometryArrays<const float>& geometry,
                    const BrickPieces& pieces);

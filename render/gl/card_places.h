@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
+#include <utility>
 #include <vector>
 
 namespace curvisplat {
@@ -28,9 +30,10 @@ class CardPlaces {
     uint64_t begin = 0, words = 0;
   };
 
-  /// Removes all items, then all pages.
+  /// Removes all items.
   void clear();
-  void removePages();
+  /// Removes the last page, and what has its place there.
+  void removeLastPage();
   void addPage(uint64_t words) { pages_.push_back({words, {}}); }
   size_t pages() const { return pages_.size(); }
 
@@ -61,11 +64,15 @@ class CardPlaces {
   };
   std::optional<uint64_t> freePlace(const Page& page, uint64_t words) const;
   uint64_t endOf(const Item& item) const;
-  void enter(const Item& item, const Entry& entry);
+  void enter(const Item& item, const Place& place, bool is_kept);
+  void use(const Item& item, Entry& entry);
+  void forget(const Item& item);
+  void remove(const Item& item);
 
   std::vector<Page> pages_;
   std::map<Item, Entry> items_;
-  size_t kept_page_ = 0;  // that keepFor() fills
+  std::set<std::pair<uint64_t, Item>> by_age_;  // Entry::used and its item
+  size_t kept_page_ = 0;                        // that keepFor() fills
   uint64_t frame_ = 0;
 };
 

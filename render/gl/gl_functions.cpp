@@ -60,7 +60,7 @@ std::string GlFunctions::whyNoCompute() const {
 void GlFunctions::check(std::string_view doing) const {
   const GLenum error = GetError();
   if (error == GL_OUT_OF_MEMORY)
-    throw PainterFailure(
+    throw CardMemoryFailure(
         "OpenGL has no memory left for {}; give --backend cpu, or end what else uses the graphics card",
         doing);
   if (error != GL_NO_ERROR)

@@ -104,7 +104,12 @@ struct GlTilePainter::State final : BrickStore {
 
   void open(uint64_t content, const StepPosition& step) override { bricks.open(content, step); }
   size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) override {
-    return bricks.makeRoom(parts, bytes);
+    return bricks.makeRoom(parts, bytes, splats, otherBytes());
+  }
+  bool giveMemoryUp() override {
+    if (!bricks.giveMemoryUp()) return false;
+    splats.release();
+    return true;
   }
   uint64_t defaultBytes() const override { return default_bytes; }
   bool has(uint32_t brick) const override { return bricks.has(brick); }
@@ -120,6 +125,8 @@ struct GlTilePainter::State final : BrickStore {
   void allocate(ImageSize wanted, int count);
   void openTiles();
   CardTiles tilesOf(bool small) const;
+  /// `splats` has these behind the stored ones, or more where more wait.
+  uint64_t otherBytes() const { return (kMaxRecords + capacity.splats) * sizeof(ScreenSplat); }
   size_t largeTiles() const { return TileSet::tilesOf(size, kLargeTile); }
   void paintBatch(bool last);
   void paintSlabs(bool last);
@@ -243,7 +250,7 @@ void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const 
       bricks.project(settings, keys, slabs[slab], tables, SplatChooser::largestScalar(*table), splats);
     });
   };
-  splats.reserve((stored + kMaxRecords + capacity.splats) * sizeof(ScreenSplat));
+  splats.reserve(stored * sizeof(ScreenSplat) + otherBytes());
   slab = 0;
   project_slab();
 }

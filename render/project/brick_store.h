@@ -95,6 +95,9 @@ class BrickStore {
   /// put there tells how many pieces it has. If all of those parts are stored, the number depends on the
   /// arguments alone. Where the card refuses the memory, fewer fit from then on.
   virtual size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) = 0;
+  /// Removes all bricks after a CardMemoryFailure, and takes at most half as much for them from then on. False if there were
+  /// none.
+  virtual bool giveMemoryUp() = 0;
   /// The default for `bytes` of makeRoom(): a share of the card's free memory; 0 if OpenGL draws on the
   /// processor.
   virtual uint64_t defaultBytes() const = 0;

@@ -12,4 +12,10 @@ class PainterFailure : public Error {
   using Error::Error;
 };
 
+/// The card refuses memory: the same painter may go on with less of it (BrickStore::giveMemoryUp()).
+class CardMemoryFailure final : public PainterFailure {
+ public:
+  using PainterFailure::PainterFailure;
+};
+
 }  // namespace curvisplat

@@ -48,11 +48,12 @@ class CardBricksTest : public ::testing::Test {
 
   /// Draws one scalar, or two where the cache has them.
   std::unique_ptr<FrameRenderer> rendererBy(Backend backend) const {
+    return std::make_unique<FrameRenderer>(*cache_, scalars(), backend);
+  }
+  DrawnScalars scalars() const {
     const TransferFunction opacities = TransferFunction::preset("viridis", -1, 1, 0.02);
-    if (cache_->manifest().variables.size() == 1)
-      return std::make_unique<FrameRenderer>(*cache_, 0, opacities, backend);
-    const DrawnScalars both({0, opacities}, {1, TransferFunction::preset("plasma", -1, 1, 0.02)});
-    return std::make_unique<FrameRenderer>(*cache_, both, backend);
+    if (cache_->manifest().variables.size() == 1) return {0, opacities};
+    return {{0, opacities}, {1, TransferFunction::preset("plasma", -1, 1, 0.02)}};
   }
   static FrameOptions options(uint64_t card_memory_bytes) {
     FrameOptions made;
@@ -254,7 +255,8 @@ TEST_F(CardBricksTest, StayAwayWithoutMemory) {
 }
 
 struct Faults {
-  int refusals = 0;  // of buffers of 100 kB and more
+  int refusals = 0;  // of buffers of 100 kB and more,
+  int accepted = 0;  // after so many of them
   bool is_refusing = false, is_reset = false;
 };
 
@@ -307,7 +309,7 @@ class FailingBackend final : public PaintingBackend {
       }
       if (wanted == "glBufferData") {
         const PFNGLBUFFERDATAPROC data = [](GLenum target, GLsizeiptr bytes, const void* from, GLenum usage) {
-          faults.is_refusing = bytes >= 100'000 && faults.refusals > 0;
+          faults.is_refusing = bytes >= 100'000 && faults.refusals > 0 && faults.accepted-- <= 0;
           if (faults.is_refusing)
             --faults.refusals;
           else
@@ -379,6 +381,37 @@ TEST_F(FailingCard, KeepsFewerBricksWhereItRefusesMemory) {
       60);
 }
 
+TEST_F(FailingCard, DrawsOnWhicheverOfItsBuffersIsRefused) {
+  FrameStatistics statistics;
+  const Image wanted = rendererBy(Backend::kCpu)->render(camera("iso"), options(0), statistics);
+  int number = 0;
+  for (bool is_refused = true; is_refused; ++number) {
+    const auto card = renderer();
+    FailingBackend::faults = {.refusals = 1, .accepted = number};
+    const Image image = card->render(camera("iso"), options(64 * kMiB), statistics);
+    is_refused = FailingBackend::faults.refusals == 0;
+    EXPECT_EQ(card->backendName(), "failing") << number;
+    EXPECT_GT(statistics.card_splats, 0u) << number;
+    EXPECT_GE(compareImages(image, wanted).psnr_db, 60) << number;
+  }
+  EXPECT_GE(number, 4);  // of splats, bricks and the lists of tiles, and none
+}
+
+TEST_F(FailingCard, IsLeftByPlayersForGood) {
+  writeRandomCacheWithBorders(folder_ / "two.splats", 7, false, 2);
+  open("two.splats");
+  StepPlayer player(*cache_, scalars(), std::make_unique<FailingBackend>());
+  FailingBackend::faults.is_reset = true;
+  FrameStatistics statistics;
+  player.renderer().render(camera("iso"), options(64 * kMiB), statistics);
+  const std::string reached = player.renderer().backendName();
+  EXPECT_NE(reached.find("quads (the graphics card was reset"), std::string::npos) << reached;
+  player.setFunctions(scalars());
+  EXPECT_EQ(player.renderer().backendName(), reached);
+  player.renderer().render(camera("iso"), options(64 * kMiB), statistics);
+  EXPECT_EQ(player.renderer().backendName(), reached);
+}
+
 TEST_F(FailingCard, LeavesItsPictureToQuadsOnceItWasReset) {
   FrameStatistics statistics;
   const Image quads = rendererBy(Backend::kEglQuads)->render(camera("iso"), options(0), statistics);
@@ -403,6 +436,37 @@ TEST(Backends, GoOnWithQuadsAndThenByTheProcessor) {
   replaceFailed(backend, "no memory");
   EXPECT_TRUE(backend->name().starts_with("CPU") && backend->name().ends_with(" (no memory)"))
       << backend->name();
+}
+
+/// A backend in compute shaders that has failed.
+class FailedBackend final : public PaintingBackend {
+ public:
+  explicit FailedBackend(bool is_software) : is_software_(is_software) {}
+  void run(const Job&) override {}
+  const std::string& name() const override { return name_; }
+  bool isSoftware() const override { return is_software_; }
+  Backend next() const override { return Backend::kEglQuads; }
+  uint64_t bytes(ImageSize, const PaintResources&) const override { return 0; }
+
+ private:
+  const bool is_software_;
+  const std::string name_ = "failed";
+};
+
+TEST(Backends, DrawNoQuadsInSoftwareForACardThatFailed) {
+  bool quads_are_software = false;
+  try {
+    quads_are_software = makeBackend(Backend::kEglQuads)->isSoftware();
+  } catch (const Error& error) {
+    GTEST_SKIP() << error.what();
+  }
+  for (const bool was_software : {false, true}) {
+    std::unique_ptr<PaintingBackend> backend = std::make_unique<FailedBackend>(was_software);
+    replaceFailed(backend, "no memory");
+    const bool has_quads = backend->name().find("quads (no memory)") != std::string::npos;
+    EXPECT_EQ(has_quads, was_software || !quads_are_software) << backend->name();
+    EXPECT_TRUE(backend->name().starts_with("CPU") || has_quads) << backend->name();
+  }
 }
 
 GLint told_kibibytes = 0;

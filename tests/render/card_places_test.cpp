@@ -45,6 +45,41 @@ TEST(CardPlaces, AreGivenUpByWhatWasNotNeededForTheLongestTime) {
   EXPECT_FALSE(places.removeOldest());  // the rest is needed now
 }
 
+TEST(CardPlaces, AreGivenUpByWhatHadALaterPlaceOnceItIsNotNeeded) {
+  CardPlaces places;
+  places.addPage(90);
+  places.beginFrame();
+  EXPECT_TRUE(places.keepFor(geometry(1), 30));
+  EXPECT_TRUE(places.keepFor(geometry(2), 30));
+  places.beginFrame();
+  places.put(values(1, 0), 30);
+  places.beginFrame();
+  places.put(geometry(1), 30);  // is renewed by this
+  for (const CardPlaces::Item& item : {geometry(2), values(1, 0)}) {
+    ASSERT_TRUE(places.removeOldest());
+    EXPECT_EQ(places.find(item), nullptr);
+  }
+  EXPECT_NE(places.find(geometry(1)), nullptr);
+  EXPECT_FALSE(places.removeOldest());
+}
+
+TEST(CardPlaces, GoWithTheirPageAlone) {
+  CardPlaces places;
+  places.addPage(60);
+  places.addPage(60);
+  places.beginFrame();
+  places.put(geometry(1), 60);
+  places.put(geometry(2), 30);
+  places.removeLastPage();
+  EXPECT_EQ(places.pages(), 1u);
+  EXPECT_NE(places.find(geometry(1)), nullptr);
+  EXPECT_EQ(places.find(geometry(2)), nullptr);
+  EXPECT_FALSE(places.put(geometry(2), 30));
+  places.beginFrame();
+  EXPECT_TRUE(places.removeOldest());
+  EXPECT_FALSE(places.removeOldest());
+}
+
 TEST(CardPlaces, AreKeptInOrderUntilTheyAreFilled) {
   CardPlaces places;
   places.addPage(100);
