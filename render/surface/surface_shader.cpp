@@ -293,8 +293,11 @@ glm::dvec3 SurfaceShader::placeSeen(const Spot& spot) const {
 /// Gives a point the map's colour; without a light of the picture it is that of the image.
 void SurfaceShader::shadeMap(const Spot& spot, const PlacedMap& map, Point& point) const {
   const ScreenView& view = triangles_.view();
-  const glm::dvec3 place = placeSeen(spot);
-  point.colour = map.at(place, pixelSide(view, view.viewFromData(place).z));
+  const glm::dvec3 place = placeSeen(spot), &scale = view.scale;
+  const double stretch =
+      map.globe.sphere() ? std::min({scale.x, scale.y, scale.z}) : std::sqrt(scale.x * scale.y);
+  const bool perspective = view.projection == Projection::kPerspective;
+  point.colour = map.at(place, (perspective ? view.viewFromData(place).z : 1) / view.focal_px / stretch);
   if (!has_light_) point.normal = glm::vec3(0.0f);
 }
 

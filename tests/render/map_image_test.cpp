@@ -108,6 +108,32 @@ void expectGlobe(Projection projection, const Globe& globe) {
   EXPECT_GT(seen, 2000);
 }
 
+/// A pixel of the picture sees as many of the map's, however heights are stretched.
+TEST(MapImage, IsAsSmoothUnderAScaleOfHeights) {
+  Image stripes({256, 128});
+  for (size_t n = 0; n < stripes.size.pixels(); ++n) {
+    stripes.rgba[4 * n] = n % 2 == 0 ? 1.0f : 0.0f;
+    stripes.rgba[4 * n + 3] = 1;
+  }
+  const Globe flat{Globe::Shape::kFlat, kRadius, 1, 0};
+  SurfaceScene scene;
+  Surface& surface = scene.surfaces.emplace_back();
+  surface.mesh = std::make_shared<TriangleMesh>(meshOfGlobe(flat, 0));
+  surface.map = std::make_shared<PlacedMap>(PlacedMap{MapImage(stripes), flat});
+  Camera camera;
+  camera.projection = Projection::kOrthographic;
+  camera.position = {0, 0, 9000};
+  camera.view_up = {0, 1, 0};
+  camera.parallel_scale = 9000;
+  const ScreenView view = ScreenView::of(camera, {60, 40}, glm::dvec3(1, 1, 100), kLowPass, 1e-3);
+  const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
+  const PixelLayers layers = layersOf(scene, view, {}, {colours, {}, {}, 0});
+  for (int x = 0; x < 60; ++x) {
+    ASSERT_EQ(layers.at(x, 20).size(), 1U);
+    EXPECT_NEAR(layers.at(x, 20)[0].colour.x, 0.5, 0.1) << x;
+  }
+}
+
 TEST(MapImage, TheGlobeShowsItWhereItsPlacesAre) {
   const Globe sphere{Globe::Shape::kSphere, kRadius, 20, 0}, flat{Globe::Shape::kFlat, kRadius, 20, 5.3};
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective})
