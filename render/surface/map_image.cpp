@@ -5,17 +5,53 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <numbers>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMaxPixels = uint64_t{1} << 26;
+
+void requireMapSize(int64_t width, int64_t height, const std::string& name) {
+  constexpr int kApart = 2;  // pixels: some programs round
+  if (width < 2 || std::abs(width - 2 * height) > kApart)
+    throw Error(
+        "{}: has {} x {} pixels; a map of the whole Earth (equirectangular, from 180 degrees west and 90 "
+        "degrees north on) is twice as wide as high",
+        name, width, height);
+  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > kMaxPixels)
+    throw Error("{}: has {} x {} pixels, more than the {} of a map; scale it down", name, width, height,
+                kMaxPixels);
+}
+
+/// Refuses a PNG file by its header: decoded, it takes 24 bytes a pixel, however short the file is.
+void checkPngHeader(const std::filesystem::path& path) {
+  constexpr std::string_view kBegin = "\x89PNG\r\n\x1a\n";
+  const InputFile file(path);
+  std::array<std::byte, 24>
+      header;  // after 8 bytes of length and name, the first chunk has the size, big-endian
+  if (file.size() < header.size()) return;
+  file.readAt(0, std::span(header));
+  if (std::memcmp(header.data(), kBegin.data(), kBegin.size()) != 0) return;
+  const auto number = [&](size_t at) {
+    int64_t value = 0;
+    for (size_t n = 0; n < 4; ++n) value = 256 * value + std::to_integer<int64_t>(header[at + n]);
+    return value;
+  };
+  requireMapSize(number(16), number(20), path.string());
+}
 
 }  // namespace
 
@@ -88,17 +124,9 @@ glm::vec3 PlacedMap::at(const glm::dvec3& point, double pixel) const {
 }
 
 MapImage readMapImage(const std::filesystem::path& path) {
+  checkPngHeader(path);
   const Image image = readImage(path);
-  const auto [width, height] = image.size;
-  constexpr int kApart = 2;  // pixels: some programs round
-  if (width < 2 || std::abs(width - 2 * height) > kApart)
-    throw Error(
-        "{}: has {} x {} pixels; a map of the whole Earth (equirectangular, from 180 degrees west and 90 "
-        "degrees north on) is twice as wide as high",
-        path.string(), width, height);
-  if (image.size.pixels() > kMaxPixels)
-    throw Error("{}: has {} x {} pixels, more than the {} of a map; scale it down", path.string(), width,
-                height, kMaxPixels);
+  requireMapSize(image.size.width, image.size.height, path.string());
   return MapImage(image);
 }
 
