@@ -10,6 +10,7 @@
 #include "render/frame/frame.h"
 #include "render/image/image_file.h"
 #include "render/image/too_little_memory.h"
+#include "render/surface/curve_times.h"
 #include "stream/base/error.h"
 #include "stream/base/os.h"
 #include "stream/base/text.h"
@@ -114,6 +115,7 @@ class MovieFrames {
   void setOptions(uint64_t step) {
     const uint64_t memory_bytes = options_.memory_bytes;  // drawWithEnough() may have taken more
     options_ = state_.frameOptions(dataSizeOf(state_, movie_.cache.manifest(), size_));
+    options_.scene = sceneAtTime(options_.scene, player_->time());
     options_.memory_bytes = memory_bytes;
     options_.keep_going = movie_.keep_going;
     if (!movie_.faces_at || !options_.scene || options_.scene->grid_surfaces.empty()) return;
