@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "stream/base/error.h"
 #include "tests/support/expect_error.h"
@@ -321,6 +323,27 @@ TEST(ViewState, DrawsIsosurfacesOfOneScalar) {
   state.volume = false;
   EXPECT_EQ(state.isovalues(), Values{1});
   expectParts(commandText(state, "a.splats"), {"--iso 1", "--iso-by density", "--volume off"});
+}
+
+/// Lines of the drawn scalar are drawn as by the command that is copied: in the picture's colours, without a bar of their own.
+TEST(ViewState, LinesOfTheScalarThatIsDrawnHaveItsFunction) {
+  GivenSheets given;
+  Curves& curves = given.curves.emplace_back();
+  curves.function = std::make_shared<TransferFunction>(TransferFunction::preset("plasma", 0, 1, 1));
+  curves.colours = std::make_shared<ColourTable>(*curves.function);
+  curves.title = "density";
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  state.given = std::make_shared<GivenSheets>(given);
+  for (const auto& [variable, bars] : {std::pair("density", 1), {"u v", 2}}) {
+    chooseVariable(state, manifest(), variable);
+    const bool has_own = bars == 2;
+    const Curves drawn = state.frameOptions({30, 20}).scene->curves.at(0);
+    EXPECT_EQ(drawn.colours != nullptr, has_own);
+    EXPECT_EQ(drawn.function != nullptr, has_own);
+    const ShownFunctions functions(state, manifest());
+    ASSERT_EQ(functions.bars().size(), static_cast<size_t>(bars));
+    EXPECT_EQ(functions.bars().back().title, has_own ? "density" : scalarTitle("density", "kg/m3"));
+  }
 }
 
 TEST(ViewState, OfAnEarlierVersionHasIsosurfacesOfItsOpacities) {

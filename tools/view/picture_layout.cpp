@@ -30,6 +30,11 @@ ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
     of_faces_ = state.faces_by->function.function();
     faces_title_ = titleOf(manifest, state.faces_by->variable);
   }
+  if (state.given && !state.given->curves.empty()) {
+    const Curves& curves = state.given->curves.front();
+    if (curves.title != state.variable) of_curves_ = curves.function;
+    curves_title_ = curves.title;
+  }
   if (!state.opacity_by) return;
   opacities_ = state.opacity_by->function.function();
   if (state.volume) opacity_title_ = titleOf(manifest, state.opacity_by->variable) + " (opacity)";
@@ -53,6 +58,7 @@ std::vector<ShownFunction> ShownFunctions::bars() const {
   std::vector<ShownFunction> bars{{&colours_, title_, shows_opacities_ ? Part::kBoth : Part::kColours}};
   if (opacities_ && !opacity_title_.empty()) bars.push_back({&*opacities_, opacity_title_, Part::kOpacities});
   if (of_faces_) bars.push_back({&*of_faces_, faces_title_});
+  if (of_curves_) bars.push_back({of_curves_.get(), curves_title_});
   return bars;
 }
 

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <future>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,7 +34,8 @@ class ShownFunctions {
  private:
   TransferFunction colours_;
   std::optional<TransferFunction> opacities_, of_faces_;  // of faces that have a scalar of their own
-  std::string title_, opacity_title_, faces_title_;
+  std::shared_ptr<const TransferFunction> of_curves_;     // of values other than the picture's
+  std::string title_, opacity_title_, faces_title_, curves_title_;
   bool shows_opacities_;  // those of colours_
 };
 

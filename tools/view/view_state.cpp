@@ -391,6 +391,11 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     if (given) {
       if (given->earth) scene->surfaces.push_back(*given->earth);
       scene->curves = given->curves;
+      for (Curves& curves : scene->curves) {
+        if (curves.title != variable) continue;
+        curves.function = nullptr;  // the picture's
+        curves.colours = nullptr;
+      }
     }
     scene->slices = visiblePlanes(slices);
     scene->slice_opacity = slice_opacity.factor;
