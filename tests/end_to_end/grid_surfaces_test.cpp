@@ -253,6 +253,27 @@ TEST_F(GridSurfaceOptions, BlankedCellsEndAtASurface) {
                 2, {"blanks has no values for a function"});
 }
 
+/// The window cannot leave a colour out of the command that it copies: other surfaces may have some.
+TEST_F(GridSurfaceOptions, BlanksShowTheImageOfTheEarthWhateverTheColours) {
+  ConvertOptions options;
+  options.output = file("sea.splats");
+  options.scalars = {0};
+  options.blank_faces = true;
+  Progress progress;
+  convert(overWaves(8, 0), options, progress);
+  Image blue({4, 2});
+  for (size_t n = 0; n < blue.size.pixels(); ++n) blue.rgba[4 * n + 2] = blue.rgba[4 * n + 3] = 1;
+  writeImage(blue, file("blue.png"));
+  const auto drawn = [&](const Words& more) {
+    run(render(Words{"--view-angle", "30", "--volume", "off", "--surface", "blanks"} + more, "sea.splats"));
+    return readImage(file("a.pfm"));
+  };
+  const Words earth{"--map", file("blue.png"), "--globe", "0.001", "--map-height", "0"};
+  const Image seen = drawn(earth);
+  EXPECT_NE(seen.rgba, drawn({"--surface-colour", "#ff0000"}).rgba);
+  EXPECT_EQ(seen.rgba, drawn(earth + Words{"--surface-colour", "#ff0000"}).rgba);
+}
+
 TEST_F(GridSurfaceOptions, VerifyFindsDamagedFaces) {
   const std::filesystem::path damaged = file("damaged.splats");
   std::filesystem::copy(file("wake.splats"), damaged, std::filesystem::copy_options::recursive);

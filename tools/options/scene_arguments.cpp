@@ -284,7 +284,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
     surface.colour = colour;
     surface.opacity = surfaceOpacity(arguments, n);
     if (arguments.surfaces[n] == kBlanks) {
-      if (earth && arguments.colours.empty()) surface.map = earth->map;
+      if (earth) surface.map = earth->map;
       if (surface.opacity.by_function)
         throw UsageError("--surface-opacity: {} has no values for a function; give a number", kBlanks);
       continue;
