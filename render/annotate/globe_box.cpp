@@ -126,6 +126,34 @@ std::optional<AnnotatedScene::OnGlobe> boxOnGlobe(const CacheReader& cache,
   return AnnotatedScene::OnGlobe{*globe, lower, upper};
 }
 
+Camera cameraAbove(const AnnotatedScene::OnGlobe& box, const glm::dvec3& scale, ImageSize size) {
+  constexpr double kViewAngle = 30, kMargin = 1.15, kNearPole = 85;
+  constexpr int kSteps = 16;
+  const Globe unit;
+  const double east = 0.5 * (box.lower.x + box.upper.x), north = 0.5 * (box.lower.y + box.upper.y);
+  const glm::dvec3 middle = unit.column(east, north);
+  double reach = 1e-4;  // the largest angle between the middle and a place of the data
+  for (int n = 0; n <= kSteps; ++n)
+    for (int m = 0; m <= kSteps; ++m) {
+      const glm::dvec3 part(static_cast<double>(n) / kSteps, static_cast<double>(m) / kSteps, 0);
+      const glm::dvec3 at = glm::mix(box.lower, box.upper, part);
+      reach = std::max(reach, std::acos(std::clamp(glm::dot(middle, unit.column(at.x, at.y)), -1.0, 1.0)));
+    }
+  const double aspect = static_cast<double>(size.width) / size.height;
+  const double slope = std::tan(glm::radians(kViewAngle / 2)) * std::min(1.0, aspect) / kMargin;
+  reach = std::min(reach, std::atan(1 / slope));  // what is further away lies behind the horizon
+  const double radius = box.globe.radius_km + std::max({0.0, box.globe.vertical_scale * box.lower.z,
+                                                        box.globe.vertical_scale * box.upper.z});
+  Camera camera;
+  camera.projection = Projection::kPerspective;
+  camera.view_angle_deg = kViewAngle;
+  camera.focal_point = glm::dvec3(0.0);
+  camera.position = scale * middle * (radius * (std::cos(reach) + std::sin(reach) / slope));
+  camera.view_up = std::abs(north) < kNearPole ? glm::dvec3(0, 0, 1) : unit.column(east, north + 90);
+  camera.parallel_scale = kMargin * radius * std::sin(reach);
+  return camera;
+}
+
 void showOnGlobe(const std::optional<AnnotatedScene::OnGlobe>& box, AnnotatedScene& scene) {
   scene.on_globe = box;
   if (box) scene.axis_titles = {"longitude", "latitude", box->isOfDepths() ? "depth [m]" : "height [m]"};

@@ -34,7 +34,7 @@ class GlobeOptions : public ProgramSuite<GlobeOptions> {
     writeDrift(*folder_ / "drift.nc", "hours since 2001-01-01");
   }
 
-  static void writeSea(const std::filesystem::path& path) {
+  static void writeSea(const std::filesystem::path& path, double west = -5, double south = 40) {
     NetcdfWriter file(path, NetcdfFileType::kClassic);
     for (const auto& [name, length] : {std::pair("time", 3), {"depth", 5}, {"lat", 17}, {"lon", 21}})
       file.dimension(name, static_cast<size_t>(length));
@@ -43,9 +43,9 @@ class GlobeOptions : public ProgramSuite<GlobeOptions> {
     file.variable("depth", kDouble, {"depth"}, {{"units", "m"}, {"positive", "down"}},
                   [](const Index& n) { return 1000.0 * static_cast<double>(n[0]); });
     file.variable("lat", kDouble, {"lat"}, {{"units", "degrees_north"}},
-                  [](const Index& n) { return 40.0 + static_cast<double>(n[0]); });
+                  [=](const Index& n) { return south + static_cast<double>(n[0]); });
     file.variable("lon", kDouble, {"lon"}, {{"units", "degrees_east"}},
-                  [](const Index& n) { return static_cast<double>(n[0]) - 5.0; });
+                  [=](const Index& n) { return west + static_cast<double>(n[0]); });
     file.variable("temp", kDouble, {"time", "depth", "lat", "lon"}, {},
                   [](const Index& n) { return static_cast<double>(n[0] + n[1] * n[1] + n[2] + 2 * n[3]); });
   }
@@ -292,12 +292,35 @@ TEST_F(GlobeOptions, TheEarthHidesWhatIsBehindIt) {
           "square.png: has 30 x 30 pixels; a map of the whole Earth (equirectangular, ");
   refused("sea", {"--map", file("sea.nc")}, 1, "sea.nc: not a PNG, ");
   refused("sea", {"--map", file("none.png")}, 1, "none.png");
-  refused("sea", {"--map", "#12"}, 2, "--map");
+  refused("sea", {"--map", "#12"}, 2, "--map #12: expected the file of an image, or a colour #rrggbb");
+  refused("sea", {"--map", "#123456", "--map-height", "1e39"}, 2,
+          "--map-height 1e39: expected at most 1e+09");
+  refused("sea", {"--no-scalar-bar", "--scalar-bar-title", "t"}, 2, "no bar with --no-scalar-bar");
+  std::string png = bytesOfFile(mapOfSquares(file("large.png")));
+  png.replace(16, 8,
+              std::string("\0\0\x75\x30\0\0\x3a\x98", 8));  // 30000 x 15000; the checksum is wrong, too
+  overwriteFile(file("large.png"), png);
+  refused("sea", {"--map", file("large.png")}, 1,
+          "has 30000 x 15000 pixels, more than the 67108864 of a map");
+  expectRefused({"view", file("sea.nc"), "--map", "#123456"}, 2, {"--map, --step and --time need a cache"});
   refused("sea", {"--map-height", "2"}, 2, "--map-height 2 needs a map: --map FILE");
   refused("sea", {"--map", "#123456", "--map-height=-1e6"}, 2, "lies below the middle of the Earth");
   run({"generate", "half-annulus", "--size", "8x8x4", "-o", file("tube")});
   run({"convert", file("tube.xyz"), file("tube.fun"), "-o", file("tube.splats")});
   refused("tube", {"--map", "#123456"}, 1, "the cache does not say where its grid has them; --globe ");
+}
+
+/// A place at either side of the Earth.
+TEST_F(GlobeOptions, WithTheEarthThePictureLooksDownAtTheData) {
+  for (const double west : {-145.0, 35.0, 120.0}) {
+    writeSea(file("far.nc"), west, west < 0 ? -48 : 20);
+    const std::string name = file(fmt::format("far{}.splats", west));
+    run({"convert", file("far.nc"), "-o", name, "--vertical-scale", "20"});
+    const Image seen = pictureOf(name, file("a.pfm"), {"--map", "#204060", "--tf", "glow"}, "160x120");
+    int of_data = 0;  // the Earth is blue
+    for (size_t n = 0; n < seen.rgba.size(); n += 4) of_data += seen.rgba[n] > seen.rgba[n + 2];
+    EXPECT_GT(of_data, 1000) << west;
+  }
 }
 
 TEST_F(GlobeOptions, HeightsAreStretchedAtDrawing) {

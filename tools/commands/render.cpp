@@ -213,7 +213,8 @@ void render(const RenderArguments& given) {
                options.scale);
   const CameraArguments camera =
       choice.picture.camera(placedAbove(arguments.camera, globe, options.scale), transfer_function,
-                            {box, options.size, has_box || options.clip_box.has_value()});
+                            {box, options.size, has_box || options.clip_box.has_value(),
+                             boxOnEarth(arguments.surfaces.map, cache, globe)});
   choice.picture.release();
   const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), box, options.size), series,
                                      arguments.steps, steps, arguments.camera.frames);

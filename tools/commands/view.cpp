@@ -23,6 +23,7 @@
 #include "tools/options/example_grid.h"
 #include "tools/options/frame_sequence.h"
 #include "tools/options/further_scalars.h"
+#include "tools/options/globe_arguments.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/kept_conversion.h"
@@ -85,7 +86,11 @@ void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerO
   options.faces_by = arguments.surfaces.surface_by;
   if (!arguments.surfaces.curves.given() && !arguments.surfaces.map.map) return;
   GivenSheets given{options.scene->curves, std::nullopt, kBlanks, optionsOfGiven(arguments.surfaces)};
-  if (arguments.surfaces.map.map) given.earth = options.scene->surfaces.back();
+  if (arguments.surfaces.map.map) {
+    given.earth = options.scene->surfaces.back();
+    given.above =
+        boxOnEarth(arguments.surfaces.map, cache, globeOf(arguments.surfaces.globe, cache.manifest()));
+  }
   options.given = std::make_shared<GivenSheets>(std::move(given));
 }
 
@@ -96,8 +101,10 @@ FaceServices faceServices() {
 /// Refuses options that need a cache from the beginning.
 void checkGridOptions(const ViewArguments& arguments) {
   if (arguments.surfaces.given() || arguments.steps.step || arguments.steps.time)
-    throw UsageError("--surface, --slice, --iso, --step and --time need a cache: convert {} first",
-                     arguments.files.front().string());
+    throw UsageError(
+        "--surface, --slice, --iso, --lines, --points, --map, --step and --time need a cache: convert {} "
+        "first",
+        arguments.files.front().string());
 }
 
 std::string whatOf(const KeptPreview& preview) {

@@ -1,6 +1,7 @@
 #include "tools/options/map_arguments.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "render/annotate/globe_box.h"
@@ -18,6 +19,14 @@ const Globe& globeFor(const std::string& map, const std::optional<Globe>& globe)
   if (!globe->degrees())
     throw Error("--map {}: needs longitudes and latitudes, but the cache's grid has lengths", map);
   return *globe;
+}
+
+glm::vec3 colourOf(const std::string& map) {
+  try {
+    return glm::vec3(parseBackground("--map", map));
+  } catch (const UsageError&) {
+    throw UsageError("--map {}: expected the file of an image, or a colour #rrggbb", map);
+  }
 }
 
 double heightOf(const MapArguments& arguments, const CacheReader& cache, const Globe& globe) {
@@ -50,8 +59,16 @@ void addMapOptions(CLI::App& command, MapArguments& arguments, const std::string
 void checkMapArguments(const MapArguments& arguments) {
   if (arguments.height && !arguments.map)
     throw UsageError("--map-height {} needs a map: --map FILE", *arguments.height);
-  if (arguments.height) parseNumber("--map-height", *arguments.height);
-  if (arguments.map && !arguments.isImage()) parseBackground("--map", *arguments.map);
+  constexpr double kMaxHeight = 1e9;
+  if (arguments.height && !(std::abs(parseNumber("--map-height", *arguments.height)) <= kMaxHeight))
+    throw UsageError("--map-height {}: expected at most {:g} kilometres, up or down", *arguments.height,
+                     kMaxHeight);
+  if (arguments.map && !arguments.isImage()) colourOf(*arguments.map);
+}
+
+std::optional<AnnotatedScene::OnGlobe> boxOnEarth(const MapArguments& arguments, const CacheReader& cache,
+                                                  const std::optional<Globe>& globe) {
+  return arguments.map && globe && globe->sphere() ? boxOnGlobe(cache, globe) : std::nullopt;
 }
 
 std::optional<Surface> mapOf(const MapArguments& arguments, const CacheReader& cache,
@@ -62,7 +79,7 @@ std::optional<Surface> mapOf(const MapArguments& arguments, const CacheReader& c
   if (arguments.isImage())
     surface.map = std::make_shared<PlacedMap>(PlacedMap{readMapImage(*arguments.map), on});
   else
-    surface.colour = glm::vec3(parseBackground("--map", *arguments.map));
+    surface.colour = colourOf(*arguments.map);
   surface.mesh = std::make_shared<TriangleMesh>(meshOfGlobe(on, heightOf(arguments, cache, on)));
   return surface;
 }

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "render/annotate/annotated_scene.h"
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/model/globe.h"
@@ -25,6 +26,11 @@ void addMapOptions(CLI::App& command, MapArguments& arguments, const std::string
 
 /// Throws UsageError; reads no file.
 void checkMapArguments(const MapArguments& arguments);
+
+/// The places of data that lies around an opaque Earth, which has to be looked at from outside; nullopt without --map, or on a flat
+/// map. Throws as boxOnGlobe().
+std::optional<AnnotatedScene::OnGlobe> boxOnEarth(const MapArguments& arguments, const CacheReader& cache,
+                                                  const std::optional<Globe>& globe);
 
 /// The Earth as an opaque surface, at its height, by default that of the data's lowest place, or the sea's if that is lower.
 /// nullopt without --map. Throws Error for a file that is no map, or if the cache has no globe.

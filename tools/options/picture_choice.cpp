@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/annotate/globe_box.h"
 #include "render/automatic/first_choice.h"
 #include "render/camera/camera.h"
 #include "render/camera/camera_path.h"
@@ -305,11 +306,7 @@ glm::dvec3 placeForOrbit(const Camera& camera, const PictureChoice::Framing& fra
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
                                       const Framing& framing) {
   if (arguments.place()) return arguments;
-  const auto& [box, size, whole] = framing;
-  const bool orbits = arguments.orbit.has_value();
-  const ViewChoice choice =
-      data().view(function, size, whole || orbits ? Framed::kBox : Framed::kSeen, box.lower, box.upper);
-  if (orbits && !choice.position) return arguments;  // around a side of thin data, it would be seen edge-on
+  const auto& [box, size, whole, above] = framing;
   const auto exactPoint = [](const glm::dvec3& point) {
     return fmt::format("{},{},{}", point.x, point.y, point.z);
   };
@@ -317,6 +314,18 @@ CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferF
     argument = value;
     add(option, value);
   };
+  if (above) {
+    const Camera camera = cameraAbove(*above, scale_, size);
+    say("--position", arguments.position, exactPoint(camera.position));
+    say("--view-up", arguments.view_up, exactPoint(camera.view_up));
+    say("--focal-point", arguments.focal_point, exactPoint(camera.focal_point));
+    say("--view-angle", arguments.view_angle, exact(camera.view_angle_deg));
+    return arguments;
+  }
+  const bool orbits = arguments.orbit.has_value();
+  const ViewChoice choice =
+      data().view(function, size, whole || orbits ? Framed::kBox : Framed::kSeen, box.lower, box.upper);
+  if (orbits && !choice.position) return arguments;  // around a side of thin data, it would be seen edge-on
   Camera camera = cameraOf(choice, box.lower, box.upper, size);
   if (orbits) camera.position = placeForOrbit(camera, framing);
   say("--position", arguments.position, exactPoint(camera.position));

@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "render/annotate/annotated_scene.h"
 #include "render/automatic/first_choice.h"
 #include "render/colour/function_parts.h"
 #include "render/colour/transfer_function.h"
@@ -62,6 +63,8 @@ class PictureChoice {
     ShownBox box;
     ImageSize size;
     bool whole = false;  // frame the whole box, not only the part of it that the function makes visible
+    std::optional<AnnotatedScene::OnGlobe> above =
+        std::nullopt;  // data around an Earth that hides what is behind it
   };
   /// The arguments, with a camera chosen from the data if they do not place one. `function`: the picture's.
   CameraArguments camera(CameraArguments arguments, const TransferFunction& function, const Framing& framing);

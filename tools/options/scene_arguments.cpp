@@ -373,6 +373,9 @@ void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, con
 }
 
 void checkAnnotationArguments(const AnnotationArguments& arguments) {
+  if (arguments.no_bars && !arguments.bar_titles.empty())
+    throw UsageError("--scalar-bar-title {}: there is no bar with --no-scalar-bar; remove one of them",
+                     arguments.bar_titles.front());
   axisTitles(arguments);
   AnnotatedScene scene;
   arguments.fill({}, scene);

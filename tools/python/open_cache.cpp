@@ -300,8 +300,9 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     const ShownBox box =
         withGrid(shownBox(manifest, frame.scale, frame.clip_box, annotations), box_on_globe, frame.scale);
     const bool whole = annotations.lieBehind() || frame.clip_box;
-    const CameraArguments camera = choice.picture.camera(placedAbove(arguments.camera, globe, frame.scale),
-                                                         function, {box, frame.size, whole});
+    const CameraArguments camera =
+        choice.picture.camera(placedAbove(arguments.camera, globe, frame.scale), function,
+                              {box, frame.size, whole, boxOnEarth(arguments.surfaces.map, reader_, globe)});
     const Camera at = chooseCameraMotion(camera, box, frame.size).camera(0);
     // The grid of the axes and edges of the box lie behind the data, before the background.
     if (annotations.lieBehind()) frame.background = glm::vec4(0);

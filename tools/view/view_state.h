@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/annotate/annotated_scene.h"
 #include "render/annotate/annotations.h"
 #include "render/camera/camera.h"
 #include "render/frame/frame.h"
@@ -81,6 +82,8 @@ struct GivenSheets {
   std::optional<Surface> earth;
   std::string faces_with_map;                                // NamedFaces that show the Earth's image
   std::vector<std::pair<std::string, std::string>> options;  // of `render`, which show the same
+  std::optional<AnnotatedScene::OnGlobe> above =
+      std::nullopt;  // data around the Earth, which the first view looks down at
 };
 
 /// Keeps what gave the volume its opacities before it took those of a scalar whose isosurfaces were to be drawn.

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "render/annotate/globe_box.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "tools/view/first_view.h"
+#include "tools/view/picture_layout.h"
 #include "tools/view/saved_views.h"
 
 namespace curvisplat {
@@ -86,6 +88,9 @@ std::string wantedScalar(const ViewerOptions& options) {
 
 PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageSize picture) {
   ViewState state = firstViewOf(cache, options.scalar.value_or(""), picture);
+  if (options.given && options.given->above)
+    state.camera =
+        cameraAbove(*options.given->above, state.scale, dataSizeOf(state, cache.manifest(), picture));
   const std::string scalar = state.variable;
   const EditedFunction automatic = state.function;
   const fs::path& whole = options.preview ? options.preview->whole : cache.cachePath();
