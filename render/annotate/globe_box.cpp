@@ -128,14 +128,14 @@ std::optional<AnnotatedScene::OnGlobe> boxOnGlobe(const CacheReader& cache,
 
 Camera cameraAbove(const AnnotatedScene::OnGlobe& box, const glm::dvec3& scale, ImageSize size) {
   constexpr double kViewAngle = 30, kMargin = 1.15, kNearPole = 85;
-  constexpr int kSteps = 16;
+  constexpr int kPlaces = 16;
   const Globe unit;
   const double east = 0.5 * (box.lower.x + box.upper.x), north = 0.5 * (box.lower.y + box.upper.y);
   const glm::dvec3 middle = unit.column(east, north);
   double reach = 1e-4;  // the largest angle between the middle and a place of the data
-  for (int n = 0; n <= kSteps; ++n)
-    for (int m = 0; m <= kSteps; ++m) {
-      const glm::dvec3 part(static_cast<double>(n) / kSteps, static_cast<double>(m) / kSteps, 0);
+  for (int n = 0; n <= kPlaces; ++n)
+    for (int m = 0; m <= kPlaces; ++m) {
+      const glm::dvec3 part(static_cast<double>(n) / kPlaces, static_cast<double>(m) / kPlaces, 0);
       const glm::dvec3 at = glm::mix(box.lower, box.upper, part);
       reach = std::max(reach, std::acos(std::clamp(glm::dot(middle, unit.column(at.x, at.y)), -1.0, 1.0)));
     }

@@ -367,7 +367,7 @@ def sizes(tab):
         scale, usual = tab.run(f"[{PAGE}.state.camera.parallel_scale / Math.max(1, cache.shape / shapeOf()), cache.shape]")
         widths.append(scale)
         expect(max(widths) < 1.2 * min(widths), f"the data keep their width: {widths}, of a shape of {usual}")
-    expect(abs(tab.run(f"{PAGE}.state.camera.parallel_scale") / first - 1) < 0.1, f"and come back as they were: {widths}")
+    expect(abs(tab.run(f"{PAGE}.state.camera.parallel_scale") / first - 1) < 0.1, f"and come back as they were: {first}, {widths}")
     # A phone: one finger rotates, two zoom and move.
     tab.resize(390, 844, 2, mobile=True)
     time.sleep(0.3)

@@ -314,12 +314,6 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
   label("range");
   if (const auto typed = typed_.draw("##range", ends, "%.6g")) set((*typed)[0], (*typed)[1]);
   nameWidget("range");
-  const char* const scale = function.asinhScale() ? "asinh" : function.logScale() ? "logarithmic" : "linear";
-  label("scale");
-  ImGui::TextUnformatted(scale);
-  nameWidget(fmt::format("scale {}", scale));
-  if (function.asinhScale())
-    hint("chosen from the data: linear around their middle, logarithmic further out");
   bool log_scale = function.logScale();
   if (option("log scale", log_scale)) {
     if (function.setLogScale(log_scale))
@@ -338,6 +332,15 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
     if (ImGui::Button("Range of this step")) set(of.min, of.max);
     nameWidget("range of this step");
   }
+  // The tick says which of the others it is.
+  if (function.asinhScale()) {
+    ImGui::SameLine();
+    ImGui::TextUnformatted("asinh scale");
+    hint("chosen from the data: linear around their middle, logarithmic further out");
+  }
+  nameWidget(fmt::format("scale {}", function.asinhScale() ? "asinh"
+                                     : function.logScale() ? "logarithmic"
+                                                           : "linear"));
 }
 
 void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {

@@ -89,6 +89,10 @@ struct ViewRequest {
   uint64_t step = 0;
   std::optional<uint64_t> next;
   std::string state;
+
+  bool showsSameAs(const ViewRequest& other) const {
+    return cache == other.cache && size == other.size && step == other.step && state == other.state;
+  }
 };
 struct FunctionRequest {
   size_t cache = 0;

@@ -106,12 +106,13 @@ class RemoteViewer::Work {
   std::string pickedText() {
     if (auto values = frames_->takeValues()) values_ = std::move(values);
     if (!values_) return {};
-    const PickRequest pick = *std::exchange(picked_, std::nullopt);
     const Asked& asked = asked_.back();
-    if (values_->request != asked.request) {
+    if (values_->request != asked.request) {  // of a picture before: the click waits for those of the newest
       values_.reset();
+      frames_->requestValues();
       return {};
     }
+    const PickRequest pick = *std::exchange(picked_, std::nullopt);
     const CacheReader& reader = caches_.reader(cache_);
     const glm::dvec2 pixel(pick.x * asked.picture.width, pick.y * asked.picture.height);
     const auto point = pointSeenAt(*values_, reader.manifest(), pixel, asked.data);
@@ -197,9 +198,11 @@ class RemoteViewer::Work {
       damaged_said_.clear();
       asked_.clear();
     }
-    picked_.reset();  // it was of another picture
+    // A click waits for the same picture at rest, which a page asks for when the button is released; one into another is gone.
+    if (asked_.empty() || !asked_.back().view.showsSameAs(view)) picked_.reset();
     values_.reset();
     const uint64_t number = frames_->request(std::move(request));
+    if (picked_) frames_->requestValues();
     // A page that asks faster than pictures come does not make this grow.
     if (asked_.size() == kMaxAsked) asked_.pop_front();
     asked_.push_back({number, view, std::move(state), reduction_, picture, data});
