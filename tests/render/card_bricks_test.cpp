@@ -256,7 +256,7 @@ TEST_F(CardBricksTest, StayAwayWithoutMemory) {
 
 struct Faults {
   int refusals = 0;  // of buffers of 100 kB and more,
-  int accepted = 0;  // after so many of them
+  int accepted = 0;  // buffers of that size that are made before one is refused
   bool is_refusing = false, is_reset = false;
 };
 

@@ -59,8 +59,7 @@ bool hasBarsByDefault(const RenderArguments& arguments, ImageSize picture) {
   return hasAnnotations() && !arguments.annotations.no_bars &&
          givenFunctionOptions(arguments.scalar).empty() && arguments.surfaces.volume == "on" &&
          arguments.camera.path.empty() && std::min(picture.width, picture.height) >= kMinSide &&
-         (isMovieName(arguments.output) || isPageName(arguments.output) ||
-          arguments.output.extension() == ".png");
+         (isMovieName(arguments.output) || arguments.output.extension() == ".png");
 }
 
 /// Memory, in bytes, that annotating and writing a picture take. `data`: the part beside the scalar bars.
