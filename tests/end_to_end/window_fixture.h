@@ -127,7 +127,8 @@ class WindowTest : public ProgramSuite<WindowTest> {
     drag(button, from, to);
     return {to.first - from.first, to.second - from.second};
   }
-  /// The final picture, as saved by Ctrl+S: all that was done before is in it.
+  /// The final picture, as saved by Ctrl+S: all that was done before is in it, and places of widgets are those of this
+  /// picture.
   Image save() {
     int number = 1;  // the window, too, takes the first that is free
     while (std::filesystem::exists(picture(number, cache_))) ++number;
@@ -136,6 +137,9 @@ class WindowTest : public ProgramSuite<WindowTest> {
       if (!std::filesystem::exists(name)) press("ctrl+s");  // a key may come before the window hears
       return eventually([&] { return std::filesystem::exists(name); }, 5);
     }));
+    // The picture is written in the middle of a frame, at whose end the window says where its widgets are.
+    const std::string message = fmt::format("message saved {}", std::filesystem::absolute(name).string());
+    EXPECT_TRUE(eventually([&] { return hasWidget(message); })) << message;
     return readImage(name);
   }
   /// The same, and the command that draws it is among those that close() returns.

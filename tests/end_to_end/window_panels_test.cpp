@@ -180,7 +180,7 @@ TEST_F(WindowPanels, APlaneIsTurnedInThePictureAndByNumbers) {
   const auto last = numbersOf(valueOf(commands[2], "--clip-plane"));
   // From +x one sees y at the right: the tip went there, and not up.
   EXPECT_NEAR(std::abs(before[3]), 1, 1e-6);
-  EXPECT_GT(after[4], 0.05);
+  EXPECT_GT(after[4], 0.1);
   EXPECT_NEAR(after[5], 0, 0.05);
   EXPECT_NEAR(std::hypot(after[3], after[4], after[5]), 1, 1e-5);  // six digits each
   // Its middle stays in it.
@@ -204,9 +204,8 @@ TEST_F(WindowPanels, AxesAreLookedAlongByAClick) {
   press("i");  // isometric: every name has a place of its own
   save();
   const auto isThere = [&] { return placeOf("axis y") == along; };
-  EXPECT_TRUE(eventually([&] { return !isThere(); }));
+  EXPECT_FALSE(isThere());
   click("axis y");
-  if (!eventually(isThere)) click("axis y");  // the name has moved between the two halves of the click
   EXPECT_TRUE(eventually(isThere));
   moveTo(rest_);
   EXPECT_GE(difference(save(), by_key), 50);

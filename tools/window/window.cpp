@@ -208,13 +208,16 @@ void Window::showInput() {
   io.KeyShift = (modifiers & GLFW_MOD_SHIFT) != 0 || io.KeysDown[GLFW_KEY_LEFT_SHIFT] ||
                 io.KeysDown[GLFW_KEY_RIGHT_SHIFT];
   std::copy(shown_buttons_.begin(), shown_buttons_.end(), io.MouseDown);
+  shown_mouse_ = {io.MousePos.x, io.MousePos.y};
 }
 
+/// What is dragged ends where the button was released: a slow frame may not have shown the mouse there before.
 void Window::showButton() {
   const Event event = events_.front();
+  ImGui::GetIO().MousePos = {static_cast<float>(event.at.x), static_cast<float>(event.at.y)};
+  if (!event.presses && glm::vec2(event.at) != shown_mouse_) return;  // the release is for the next frame
   events_.pop_front();
   shown_buttons_[static_cast<size_t>(event.button)] = event.presses;
-  ImGui::GetIO().MousePos = {static_cast<float>(event.at.x), static_cast<float>(event.at.y)};
 }
 
 /// Dear ImGui takes all keys of a frame before its letters, and no letters with Control. So letters after
@@ -250,7 +253,6 @@ void Window::beginFrame() {
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   showInput();
-  last_covers_ = std::exchange(covers_, {});
   ImGui::NewFrame();
 }
 
@@ -270,6 +272,7 @@ void Window::closeWidgets() {
 
 void Window::endFrame(const glm::vec3& background, bool next_is_near) {
   ImGui::Render();
+  last_covers_ = std::exchange(covers_, {});
   // By OpenGL in software, drawing takes as long as a picture of moving data does.
   const uint64_t appearance = appearanceOf(*ImGui::GetDrawData());
   if (shown_ == appearance) return;

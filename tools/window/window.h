@@ -187,13 +187,14 @@ class Window {
   std::deque<Event> events_;             // what Dear ImGui has yet to see, in order
   std::vector<int> shown_keys_;          // reported as down in its last frame
   std::array<bool, 5> shown_buttons_{};  // as Dear ImGui knows them
+  glm::vec2 shown_mouse_{0.0f};          // where it was in Dear ImGui's last frame
   bool holds_input_ = false;
   bool input_ = true;
   std::optional<double> left_out_since_s_;  // by GLFW's clock
   std::optional<uint64_t> shown_;           // appearanceOf() the frame that is shown; none: draw it again
 
   Rectangle picture_;
-  std::vector<Rectangle> covers_, last_covers_;  // of this frame, and of the one that is shown
+  std::vector<Rectangle> covers_, last_covers_;  // of the frame that is being made, and of the last one
   std::vector<glm::dvec2> clicks_;
   std::vector<std::string> dropped_;
   float text_height_ = 0;
