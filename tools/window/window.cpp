@@ -222,7 +222,7 @@ void Window::showButton() {
 
 /// Dear ImGui takes all keys of a frame before its letters, and no letters with Control. So letters after
 /// Control, other keys after letters, a click after either, and all after a key with Control wait for the
-/// next frame.
+/// next frame. What follows Tab waits for one more, in which the next field gets the focus.
 void Window::showTyped() {
   ImGuiIO& io = ImGui::GetIO();
   const auto isControl = [](int key) {
@@ -243,6 +243,8 @@ void Window::showTyped() {
     io.KeysDown[next.key] = true;
     shown_keys_.push_back(next.key);
     control |= isControl(next.key);
+    holds_input_ = next.key == GLFW_KEY_TAB;
+    if (holds_input_) break;
     if (!next.command) continue;
     keys_.push_back(*next.command);
     if (next.command->control && !isControl(next.key)) break;  // it may open a dialog, for which the rest is
