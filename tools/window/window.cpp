@@ -211,7 +211,7 @@ void Window::showInput() {
   shown_mouse_ = {io.MousePos.x, io.MousePos.y};
 }
 
-/// What is dragged ends where the button was released: a slow frame may not have shown the mouse there before.
+/// Ends a drag where the button was released: a slow frame may not have shown the mouse there before.
 void Window::showButton() {
   const Event event = events_.front();
   ImGui::GetIO().MousePos = {static_cast<float>(event.at.x), static_cast<float>(event.at.y)};
