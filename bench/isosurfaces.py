@@ -11,7 +11,9 @@ pressure's gradient at their nodes; both programs then get the same .vts file. O
 --source: ours are contours of the grid's own cells, not of a lattice of voxels.
 
 --drawn: what `render --iso` draws beside VTK's contour drawn by `render --surface`, from four views of 700x500 pixels.
-Prints the least share of the pixels of either that both cover, and that of each view.
+Prints the least share of the pixels of either that both cover, that of each view, and the processor time of our picture
+from +z. Besides the grids above: every other node of the North Sea (blanked), whose contour is that of the cells without a
+blanked corner, and density in the cells of sqnz_s, whose contour is of the means at the nodes: not the same field.
 
 Prints, for each: the share of VTK's surface within half a cell of ours and of ours within half a cell of VTK's, by area,
 the 99 % distance in cells, triangles, and the processor time of both. Needs VTK for Python.
@@ -188,6 +190,78 @@ def within(grid, of, to, rng):
     return np.mean(parts <= 0.5), np.quantile(parts, 0.99)
 
 
+def north_sea(folder, grids):
+    """Every other node along each axis. The file, and the cells that are there."""
+    def records(path):
+        raw = (grids / path).read_bytes()
+        at = 0
+        while at < len(raw):
+            count = int(np.frombuffer(raw, "<i4", 1, at)[0])
+            yield raw[at + 4:at + 4 + count]
+            at += count + 8
+    blocks, dims, nodes = records("nemo_northsea/nemo_northsea_u.xyz")
+    shape = np.frombuffer(dims, "<i4")[::-1]
+    count = int(np.prod(shape))
+    at = np.frombuffer(nodes, "<f4", 3 * count).reshape(3, *shape)[:, ::2, ::2, ::2]
+    there = np.frombuffer(nodes, "<i4", count, 12 * count).reshape(shape)[::2, ::2, ::2]
+    values = np.frombuffer(list(records("nemo_northsea/nemo_northsea_u.fun"))[2], "<f4", count).reshape(shape)[::2, ::2, ::2]
+    size = np.array(there.shape[::-1], "<i4")
+    stem = folder / "ocean"
+    stem.with_suffix(".xyz").write_bytes(size.tobytes() + at.tobytes() + there.astype("<i4").tobytes())
+    stem.with_suffix(".fun").write_bytes(size.tobytes() + np.array([1], "<i4").tobytes() + values.tobytes())
+    stem.with_suffix(".nam").write_text("uo\n")
+    grid = structured(size, at.reshape(3, -1).T)
+    grid.GetPointData().AddArray(named("uo", values.reshape(-1)))
+    corners = [there[k:k + size[2] - 1, j:j + size[1] - 1, i:i + size[0] - 1] != 0
+               for k in (0, 1) for j in (0, 1) for i in (0, 1)]
+    grid.GetCellData().AddArray(named("there", np.all(corners, 0).reshape(-1).astype(float)))
+    cells = vtk.vtkThreshold()
+    cells.SetInputData(grid)
+    cells.SetInputArrayToProcess(0, 0, 0, vtk.vtkDataObject.FIELD_ASSOCIATION_CELLS, "there")
+    cells.SetLowerThreshold(0.5)
+    cells.SetUpperThreshold(1.5)
+    cells.Update()
+    return [stem.with_suffix(".xyz"), stem.with_suffix(".fun")], cells.GetOutput(), values[there != 0]
+
+
+def named(name, values):
+    array = numpy_to_vtk(np.ascontiguousarray(values, dtype=np.float32), deep=True)
+    array.SetName(name)
+    return array
+
+
+def squeezed(_, grids):
+    """Cells of twelve blocks, with VTK's means at their nodes."""
+    path = grids / "cgns/sqnz_s.adf.cgns"
+    reader = vtk.vtkCGNSReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    reader.EnableAllCellArrays()
+    reader.Update()
+    all_blocks = vtk.vtkAppendFilter()
+    all_blocks.MergePointsOn()
+    base = reader.GetOutput().GetBlock(0)
+    for n in range(base.GetNumberOfBlocks()):
+        all_blocks.AddInputData(base.GetBlock(n))
+    means = vtk.vtkCellDataToPointData()
+    means.SetInputConnection(all_blocks.GetOutputPort())
+    means.Update()
+    grid = means.GetOutput()
+    return [path], grid, vtk_to_numpy(grid.GetPointData().GetArray("Density"))
+
+
+def drawn_besides(arguments):
+    for name, read, scalar in (("ocean", north_sea, "uo"), ("sqnz", squeezed, "Density")):
+        if arguments.only and arguments.only != name or not arguments.grids.is_dir():
+            continue
+        files, grid, values = read(arguments.folder, arguments.grids)
+        cache = arguments.folder / f"{name}.splats"
+        subprocess.run([arguments.curvisplat, "convert", *files, "-o", cache, "--overwrite", "--scalar", scalar],
+                       check=True, stdout=subprocess.DEVNULL)
+        for percent in (60, 80, 95):
+            compare_drawn(arguments, grid, cache, name, scalar, float(np.percentile(values, percent)))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
@@ -229,6 +303,8 @@ def main():
             for percent in (60, 80, 95):
                 value = float(np.percentile(values, percent))
                 (compare_drawn if arguments.drawn else compare)(arguments, grid, cache, name, scalar, value)
+    if arguments.drawn:
+        drawn_besides(arguments)
 
 
 def covered(arguments, cache, scalar, view, what):
@@ -251,13 +327,16 @@ def compare_drawn(arguments, grid, cache, name, scalar, value):
     writer.SetFileTypeToBinary()
     writer.SetFileName(str(arguments.folder / "vtk.stl"))
     writer.Write()
-    shares = []
+    shares, seconds = [], 0
     for view in ("iso", "+x", "+y", "+z"):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         ours = covered(arguments, cache, scalar, view, [f"--iso={value:.9g}"])
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         theirs = covered(arguments, cache, scalar, view, ["--surface", arguments.folder / "vtk.stl"])
         shares.append((ours & theirs).sum() / max(1, (ours | theirs).sum()))
     print(f"{name:<10}{scalar:<28}{value:>10.4g}  least {100 * min(shares):.2f} %, " +
-          ", ".join(f"{100 * share:.2f}" for share in shares), flush=True)
+          ", ".join(f"{100 * share:.2f}" for share in shares) + f"; {seconds:.2f} s", flush=True)
 
 
 def compare(arguments, grid, cache, name, scalar, value):

@@ -95,6 +95,9 @@ class Contour {
     std::array<size_t, 8> corners;
     for (size_t c = 0; c < 8; ++c)
       corners[c] = node + (c & 1) * strides_[0] + (c >> 1 & 1) * strides_[1] + (c >> 2) * strides_[2];
+    if (nodes_.hasBlanks() &&
+        std::any_of(corners.begin(), corners.end(), [this](size_t corner) { return nodes_.isBlank(corner); }))
+      return;
     std::array<uint8_t, 12> next;  // [edge]: that the line which begins there ends at
     next.fill(12);
     for (const Face& face : kFaces) addLines(face, corners, next);

@@ -26,7 +26,8 @@ struct FoundNode {
   glm::vec3 slope;
 };
 
-FoundNode nodeOf(const SplatGeometry& g, const SplatVariable& v, size_t n) {
+/// `is_part`: the splat is a part of the node's cell, whose border code does not tell where the node is.
+FoundNode nodeOf(const SplatGeometry& g, const SplatVariable& v, size_t n, bool is_part) {
   const double a0 = g.axis0[n], a1 = g.axis1[n], a2 = g.axis2[n];
   const double l10 = g.shear10[n], l20 = g.shear20[n], l21 = g.shear21[n];
   const glm::dvec3 w(v.slope0[n], v.slope1[n], v.slope2[n]);
@@ -34,6 +35,7 @@ FoundNode nodeOf(const SplatGeometry& g, const SplatVariable& v, size_t n) {
   const double z = w.z / a2, y = w.y / a1 - l21 * z, x = w.x / a0 - l10 * y - l20 * z;  // A⁻ᵀ w
   const glm::vec3 slope(x, y, z);
   if (std::isfinite(slope.x) && std::isfinite(slope.y) && std::isfinite(slope.z)) node.slope = slope;
+  if (is_part) return node;
   const InwardAxes inward = inwardAxes(g.border_code[n]);
   if (inward.behind || inward.plate || inward.ratio > 0) return node;
   glm::dvec3 q(0.0);
@@ -92,12 +94,17 @@ Moved movedBy(const glm::dvec3& here, const std::array<AlongAxis, 3>& axes) {
   return moved;
 }
 
+/// The nodes without a splat of their own that are not blanked.
+uint64_t joinedNodes(const Manifest& manifest) {
+  return manifest.nodes - manifest.blanked_nodes - manifest.splats;
+}
+
 }  // namespace
 
 bool GridNodes::canBeOf(const Manifest& manifest) {
   if (manifest.cells || manifest.stretch != kDualCells || manifest.overlap == kOverlapOwner) return false;
-  if (manifest.blanked_nodes != 0 || manifest.splats > manifest.nodes || manifest.nodes > kMaxNodes)
-    return false;
+  if (manifest.nodes > kMaxNodes || manifest.blanked_nodes > manifest.nodes) return false;
+  if (manifest.splats > manifest.nodes - manifest.blanked_nodes) return false;
   uint64_t nodes = 0;
   for (const BlockInfo& block : manifest.blocks) {
     if (std::min({block.ni, block.nj, block.nk}) < 2) return false;
@@ -109,15 +116,18 @@ bool GridNodes::canBeOf(const Manifest& manifest) {
 }
 
 GridNodes::Bytes GridNodes::bytes(const Manifest& manifest, bool two_scalars) {
-  const uint64_t joined = sizeof(JoinedNode) * (manifest.nodes - manifest.splats);
-  const uint64_t kept = manifest.nodes * sizeof(float) * (two_scalars ? 5 : 4) + joined;
+  const uint64_t joined = sizeof(JoinedNode) * joinedNodes(manifest);
+  const uint64_t marks = manifest.blanked_nodes > 0 ? manifest.nodes : 0;
+  // Where nodes share a splat, their gradients need to know whose (NodeGradients).
+  const uint64_t shared = joined > 0 ? sizeof(uint32_t) * manifest.nodes + joined : 0;
+  const uint64_t kept = manifest.nodes * sizeof(float) * (two_scalars ? 5 : 4) + joined + marks;
   uint64_t more = manifest.nodes * 3 * sizeof(float);
   uint64_t of_plane = 0;
   for (const BlockInfo& block : manifest.blocks) {
     of_plane = std::max(of_plane, block.ni * block.nj);
     if (joined > 0) more += joinBytes({{block.ni, block.nj, block.nk}, 0});
   }
-  return {kept + more + 2 * sizeof(glm::vec3) * of_plane, kept};
+  return {kept + more + 2 * sizeof(glm::vec3) * of_plane, kept, shared};
 }
 
 void GridNodes::Slopes::resize(size_t count) {
@@ -126,11 +136,13 @@ void GridNodes::Slopes::resize(size_t count) {
 
 GridNodes::GridNodes(const CacheReader& cache, size_t variable, std::optional<size_t> other, bool keep_going,
                      const std::function<void()>& throw_if_stopped)
-    : origin_(0.5 * (cache.manifest().lower + cache.manifest().upper)), keep_going_(keep_going) {
+    : origin_(0.5 * (cache.manifest().lower + cache.manifest().upper)),
+      has_parts_(cache.manifest().hasFeature(kCellOctants)),
+      keep_going_(keep_going) {
   size_t first = 0;
   for (const BlockInfo& block : cache.manifest().blocks) {
     blocks_.push_back({{block.ni, block.nj, block.nk}, first});
-    first += static_cast<size_t>(block.ni * block.nj * block.nk);
+    first += blocks_.back().nodes();
   }
   for (std::vector<float>* part : {&x_, &y_, &z_, &value_}) part->resize(first);
   if (other) {
@@ -141,9 +153,26 @@ GridNodes::GridNodes(const CacheReader& cache, size_t variable, std::optional<si
   slopes_ = {};
 }
 
-void GridNodes::read(const CacheReader& cache, size_t variable,
-                     const std::function<void()>& throw_if_stopped) {
+void GridNodes::read(const CacheReader& cache, size_t variable, const Stop& throw_if_stopped) {
+  const Manifest& manifest = cache.manifest();
   slopes_.resize(value_.size());
+  readLeaves(cache, variable, throw_if_stopped);
+  if (!complete_ || !join(manifest)) return;
+  if (manifest.blanked_nodes > 0 && !hasBlanks()) {
+    markBlanks();
+    readLeaves(cache, variable, throw_if_stopped);
+    if (!complete_ || !join(manifest)) return;
+  }
+  const VariableInfo& info = manifest.variables[variable];
+  const auto least = static_cast<float>(info.min), most = static_cast<float>(info.max);
+  if (hasBlanks() && has_parts_)
+    for (const Block& block : blocks_) completeParts(block);
+  for (const Block& block : blocks_) moveToNodes(block);
+  for (const Block& block : blocks_) unbend(block, least, most);
+  copyToJoined();
+}
+
+void GridNodes::readLeaves(const CacheReader& cache, size_t variable, const Stop& throw_if_stopped) {
   std::fill(value_.begin(), value_.end(), kNone);
   SplatGeometry geometry;
   SplatVariable values;
@@ -160,21 +189,18 @@ void GridNodes::read(const CacheReader& cache, size_t variable,
       damaged_.emplace(brick, error.what());
     }
   }
-  if (!damaged_.empty()) complete_ = false;
-  if (!complete_ || !join()) return;
-  const VariableInfo& info = cache.manifest().variables[variable];
-  for (const Block& block : blocks_) moveToNodes(block);
-  for (const Block& block : blocks_)
-    unbend(block, static_cast<float>(info.min), static_cast<float>(info.max));
-  copyToJoined();
+  complete_ = damaged_.empty();
 }
 
 /// Gives nodes that share a splat its place, value and slope. Returns false if they are not found.
-bool GridNodes::join() {
-  std::vector<uint8_t> is_there(value_.size());
-  for (size_t node = 0; node < value_.size(); ++node) is_there[node] = !std::isnan(value_[node]);
+bool GridNodes::join(const Manifest& manifest) {
   if (joined_.empty()) {
-    auto joined = findJoinedNodes(blocks_, is_there, [&](size_t node) { return glm::dvec3(position(node)); });
+    std::vector<uint8_t> is_there(value_.size());
+    for (size_t node = 0; node < value_.size(); ++node) is_there[node] = !std::isnan(value_[node]);
+    complete_ = static_cast<uint64_t>(std::count(is_there.begin(), is_there.end(), 1)) == manifest.splats;
+    if (!complete_) return false;
+    auto joined = findJoinedNodes(blocks_, is_there, joinedNodes(manifest),
+                                  [&](size_t node) { return glm::dvec3(position(node)); });
     complete_ = joined.has_value();
     if (joined) joined_ = *std::move(joined);
   }
@@ -186,6 +212,56 @@ void GridNodes::copyToJoined() {
   for (const auto& [node, same] : joined_)
     for (std::vector<float>* part : {&x_, &y_, &z_, &value_, &slopes_.x, &slopes_.y, &slopes_.z})
       (*part)[node] = (*part)[same];
+}
+
+void GridNodes::markBlanks() {
+  marks_.resize(value_.size());
+  for (size_t node = 0; node < value_.size(); ++node) marks_[node] = std::isnan(value_[node]) ? kBlank : 0;
+  for (const auto& [node, same] : joined_) marks_[node] = marks_[same] = kShared;
+}
+
+GridNodes::OfAxes GridNodes::neighbours(const Block& block, size_t node, const Index& index) const {
+  OfAxes of_axes;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const size_t stride = block.stride(axis);
+    of_axes[axis] = {index[axis] > 0 && !isBlank(node - stride) ? node - stride : node,
+                     index[axis] + 1 < block.size[axis] && !isBlank(node + stride) ? node + stride : node};
+  }
+  return of_axes;
+}
+
+GridNodes::OfAxes GridNodes::neighbours(const Block& block, size_t node) const {
+  Index index;
+  for (size_t axis = 0; axis < 3; ++axis)
+    index[axis] = (node - block.first) / block.stride(axis) % block.size[axis];
+  return neighbours(block, node, index);
+}
+
+/// The middle of what is left of a node's cell beside cells with a blanked corner, in cells from the middle of it all; none if nothing is
+/// missing. As preprocess/splats/node_splats.cpp has it: along an axis with one neighbour, both halves are towards that one. Where blocks
+/// meet, the splat has parts of several cells; it is taken for a whole one.
+std::optional<glm::dvec3> GridNodes::middleOfPart(const Block& block, size_t node) const {
+  if (!has_parts_ || !hasBlanks() || marks_[node] != 0) return std::nullopt;
+  const OfAxes axes = neighbours(block, node);
+  glm::dvec3 sum(0.0);
+  int left = 0;
+  for (unsigned octant = 0; octant < 8; ++octant) {
+    std::array<size_t, 3> step{};  // wraps around below the node
+    glm::dvec3 at;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const bool is_below = (octant >> axis & 1) != 0;
+      const auto& [before, after] = axes[axis];
+      step[axis] = ((is_below && before != node) || after == node ? before : after) - node;
+      at[static_cast<int>(axis)] = is_below ? -0.25 : 0.25;
+    }
+    const auto& [i, j, k] = step;
+    if (isBlank(node + i + j) || isBlank(node + i + k) || isBlank(node + j + k) || isBlank(node + i + j + k))
+      continue;
+    sum += at;
+    ++left;
+  }
+  if (left == 0 || left == 8) return std::nullopt;
+  return sum / static_cast<double>(left);
 }
 
 void GridNodes::addLeaf(const CacheReader& cache, uint32_t brick, const SplatGeometry& geometry,
@@ -203,7 +279,7 @@ void GridNodes::addLeaf(const CacheReader& cache, uint32_t brick, const SplatGeo
     const Block& block = blocks_[run.block];
     size_t node = block.first + static_cast<size_t>((run.k * block.size[1] + run.j) * block.size[0] + run.i);
     for (uint64_t n = 0; n < run.count; ++n, ++node, ++splat) {
-      const FoundNode found = nodeOf(geometry, values, splat);
+      const FoundNode found = nodeOf(geometry, values, splat, middleOfPart(block, node).has_value());
       x_[node] = static_cast<float>(lowest.x + found.at.x);
       y_[node] = static_cast<float>(lowest.y + found.at.y);
       z_[node] = static_cast<float>(lowest.z + found.at.z);
@@ -213,6 +289,35 @@ void GridNodes::addLeaf(const CacheReader& cache, uint32_t brick, const SplatGeo
       slopes_.z[node] = found.slope.z;
     }
   }
+}
+
+/// Moves what is left of cells beside blanked ones to where the splats of the whole cells would be: along axes with one neighbour at the
+/// node, else in the cell's middle.
+void GridNodes::completeParts(const Block& block) {
+  forNodes(block, [&](size_t node, const OfAxes& axes) {
+    const auto middle = middleOfPart(block, node);
+    if (!middle) return;
+    const glm::dvec3 at(position(node));
+    glm::dvec3 whole = at;
+    double of_node = 1;
+    for (int n = 0; n < 3; ++n) {
+      const auto& [before, after] = axes[static_cast<size_t>(n)];
+      if (before != node && after != node) {
+        whole -= 0.5 * (*middle)[n] * glm::dvec3(position(after) - position(before));
+      } else if (before != after) {
+        // A quarter of the way to the neighbour.
+        whole -= 0.25 * glm::dvec3(position(before != node ? before : after));
+        of_node -= 0.25;
+      }
+    }
+    whole /= of_node;
+    const double value =
+        value_[node] + glm::dot(glm::dvec3(slopes_.x[node], slopes_.y[node], slopes_.z[node]), whole - at);
+    x_[node] = static_cast<float>(whole.x);
+    y_[node] = static_cast<float>(whole.y);
+    z_[node] = static_cast<float>(whole.z);
+    if (std::isfinite(value)) value_[node] = static_cast<float>(value);
+  });
 }
 
 /// Moves positions from the middles of cells to the nodes, and values with them; adds what bent coordinates have taken from means.
@@ -227,17 +332,19 @@ void GridNodes::moveToNodes(const Block& block) {
     for (size_t j = 0; j < nj; ++j)
       for (size_t i = 0; i < ni; ++i) {
         const size_t n = j * ni + i, node = first + n;
-        const glm::dvec3 at(here[n]);
-        const auto in_plane = [&](size_t index, size_t count, size_t stride) {
-          const bool whole = index > 0 && index + 1 < count;
-          return AlongAxis{glm::dvec3(index > 0 ? here[n - stride] : here[n]),
-                           glm::dvec3(index + 1 < count ? here[n + stride] : here[n]), whole};
+        if (isBlank(node)) continue;
+        const OfAxes beside = neighbours(block, node, {i, j, k});
+        const auto placeOf = [&](size_t other) {
+          if (other >= first + plane) return glm::dvec3(position(other));
+          return glm::dvec3(other < first ? last[n] : here[other - first]);
         };
-        const AlongAxis across{k > 0 ? glm::dvec3(last[n]) : at,
-                               k + 1 < nk ? glm::dvec3(position(node + plane)) : at, k > 0 && k + 1 < nk};
-        const Moved moved = movedBy(at, {in_plane(i, ni, 1), in_plane(j, nj, ni), across});
+        std::array<AlongAxis, 3> axes;
+        for (size_t axis = 0; axis < 3; ++axis)
+          axes[axis] = {placeOf(beside[axis].before), placeOf(beside[axis].after),
+                        beside[axis].areBoth(node)};
+        const Moved moved = movedBy(glm::dvec3(here[n]), axes);
         const glm::dvec3 slope(slopes_.x[node], slopes_.y[node], slopes_.z[node]);
-        const glm::dvec3 to = at - moved.shift;
+        const glm::dvec3 to = glm::dvec3(here[n]) - moved.shift;
         const double value = value_[node] + glm::dot(slope, kBend * moved.bend - moved.shift);
         x_[node] = static_cast<float>(to.x);
         y_[node] = static_cast<float>(to.y);
@@ -257,30 +364,25 @@ void GridNodes::unbend(const Block& block, float least, float most) {
   std::vector<float>& next = slopes_.y;
   std::copy(value_.begin() + begin, value_.begin() + end, means.begin() + begin);
   for (int step = 0; step < kUnbendSteps; ++step) {
-    forNodes(block, [&](size_t node, const std::array<Neighbours, 3>& axes) {
+    forNodes(block, [&](size_t node, const OfAxes& axes) {
       float second = 0;
       for (const Neighbours& axis : axes)
-        if (axis.whole) second += (value_[axis.after] - value_[node]) - (value_[node] - value_[axis.before]);
+        if (axis.areBoth(node))
+          second += (value_[axis.after] - value_[node]) - (value_[node] - value_[axis.before]);
       next[node] = std::clamp(means[node] - static_cast<float>(kBend) * second, least, most);
     });
     std::copy(next.begin() + begin, next.begin() + end, value_.begin() + begin);
   }
 }
 
-/// Calls use(node, neighbours) for the nodes of a block in order.
+/// Calls use(node, neighbours) for the nodes of a block that are there, in order.
 template <typename Use>
 void GridNodes::forNodes(const Block& block, const Use& use) const {
-  const std::array<uint64_t, 3>& size = block.size;
-  const auto along = [](size_t node, uint64_t index, uint64_t count, size_t stride) {
-    return Neighbours{index > 0 ? node - stride : node, index + 1 < count ? node + stride : node,
-                      index > 0 && index + 1 < count};
-  };
   size_t node = block.first;
-  for (uint64_t k = 0; k < size[2]; ++k)
-    for (uint64_t j = 0; j < size[1]; ++j)
-      for (uint64_t i = 0; i < size[0]; ++i, ++node)
-        use(node, std::array{along(node, i, size[0], 1), along(node, j, size[1], block.stride(1)),
-                             along(node, k, size[2], block.stride(2))});
+  for (uint64_t k = 0; k < block.size[2]; ++k)
+    for (uint64_t j = 0; j < block.size[1]; ++j)
+      for (uint64_t i = 0; i < block.size[0]; ++i, ++node)
+        if (!isBlank(node)) use(node, neighbours(block, node, {i, j, k}));
 }
 
 }  // namespace curvisplat

@@ -11,8 +11,6 @@ namespace {
 /// The bytes of a triangle and its half of a vertex while the mesh is made: in arrays that double when they are full, with the old array
 /// beside the new one. It is more than the mesh takes with its vertices on the screen and its runs in tiles.
 constexpr uint64_t kTriangleBytes = 80;
-/// The bytes of a node while meshes are made, where nodes share splats: who has whose (NodeGradients).
-constexpr uint64_t kSharedBytes = sizeof(uint32_t) + sizeof(JoinedNode);
 
 /// The most triangles of all isosurfaces together: each cell has few of each.
 uint64_t mostTriangles(uint64_t nodes, size_t values) {
@@ -33,9 +31,9 @@ bool IsoMeshes::Wanted::operator==(const Wanted& wanted) const {
 
 uint64_t IsoMeshes::bytes(const Manifest& manifest, bool two_scalars, size_t values) {
   if (!canBeOf(manifest)) return 0;
-  const auto [while_made, kept] = GridNodes::bytes(manifest, two_scalars);
-  const uint64_t shared = manifest.splats < manifest.nodes ? kSharedBytes * manifest.nodes : 0;
-  return std::max(while_made, kept + shared + kTriangleBytes * mostTriangles(manifest.nodes, values));
+  const GridNodes::Bytes bytes = GridNodes::bytes(manifest, two_scalars);
+  return std::max(bytes.while_made,
+                  bytes.kept + bytes.of_gradients + kTriangleBytes * mostTriangles(manifest.nodes, values));
 }
 
 const IsoMeshes::Meshes* IsoMeshes::of(const CacheReader& cache, const Wanted& wanted,

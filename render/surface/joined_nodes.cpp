@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
@@ -9,6 +10,8 @@
 #include <set>
 #include <tuple>
 #include <utility>
+
+#include "render/surface/node_tree.h"
 
 namespace curvisplat {
 namespace {
@@ -58,6 +61,12 @@ struct Expected {
   glm::dvec3 at;
   glm::dmat3 cell;
 };
+/// A node of a face that is looked for.
+struct Missing {
+  Place place;
+  Expected expected;
+  glm::dmat3 in_cells;  // the inverse of its cell
+};
 
 class Joiner {
  public:
@@ -67,29 +76,32 @@ class Joiner {
     for (size_t block = 0; block < blocks.size(); ++block)
       for (size_t axis = 0; axis < 3; ++axis)
         for (const bool at_end : {false, true}) faces_.push_back({block, axis, at_end});
+    std::vector<NodeTree::Point> candidates;
     for (const BlockFace& face : faces_)
-      forFace(face, [&](const Place&, size_t node) {
-        if (is_there_[node]) candidates_.push_back({at_(node).x, static_cast<uint32_t>(node)});
+      forFace(face, [&](const Place& place, size_t node) {
+        if (is_there_[node] && isFirstFaceOf(face, place))
+          candidates.push_back({at_(node), static_cast<uint32_t>(node)});
       });
-    std::sort(candidates_.begin(), candidates_.end());
-    candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
+    candidates_ = NodeTree(std::move(candidates));
   }
 
-  std::optional<std::vector<JoinedNode>> find() {
-    size_t left = static_cast<size_t>(std::count(is_there_.begin(), is_there_.end(), 0));
+  std::optional<std::vector<JoinedNode>> find(uint64_t count) {
+    const bool has_blanks = static_cast<uint64_t>(std::count(is_there_.begin(), is_there_.end(), 0)) != count;
+    auto left = static_cast<int64_t>(count);
     // What a face finds may tell the next one where its nodes are expected.
     for (bool any = true; any && left > 0;) {
       any = false;
       for (const BlockFace& face : faces_)
         for (int round = 0; round < kMaxRounds; ++round) {
           const size_t found = joinFace(face);
-          left -= found;
+          left -= static_cast<int64_t>(found);
           any = any || found > 0;
           if (found == 0) break;
         }
       if (compared_ > kMaxCompared) break;
     }
-    if (left > 0) return std::nullopt;
+    if (has_blanks && left > 0) left -= static_cast<int64_t>(joinBesideBlanks());
+    if (left != 0) return std::nullopt;
     std::vector<JoinedNode> joined;
     for (size_t node = 0; node < same_.size(); ++node)
       if (same_[node] != kNobody) joined.push_back({static_cast<uint32_t>(node), same_[node]});
@@ -97,8 +109,6 @@ class Joiner {
   }
 
  private:
-  using Candidate = std::pair<double, uint32_t>;  // x, node
-
   template <typename Use>
   void forFace(const BlockFace& face, const Use& use) const {
     const NodeLattice3& block = blocks_[face.block];
@@ -120,6 +130,15 @@ class Joiner {
       node += static_cast<size_t>(index[axis]) * block.stride(axis);
     }
     return node;
+  }
+  /// Whether a node on several faces is counted with this one.
+  bool isFirstFaceOf(const BlockFace& face, const Place& place) const {
+    const size_t node = *nodeAt(face, place);
+    for (const BlockFace& other : std::span(faces_).subspan(6 * face.block, 6)) {
+      if (!(other < face)) return true;
+      if (placeOn(other, node)) return false;
+    }
+    return true;
   }
   bool isKnown(size_t node) const { return is_there_[node] || same_[node] != kNobody; }
   glm::dvec3 at(size_t node) const { return at_(is_there_[node] ? node : same_[node]); }
@@ -149,40 +168,53 @@ class Joiner {
   static double lengthOf(const glm::dvec3& in_cells) {
     return std::max({std::abs(in_cells.x), 2 * std::abs(in_cells.y), 2 * std::abs(in_cells.z)});
   }
-  double inCells(size_t node, const Expected& expected) const {
-    return lengthOf(glm::inverse(expected.cell) * (at_(node) - expected.at));
-  }
   /// The candidate nearest to there, in cells.
-  std::optional<size_t> nearest(const Expected& expected) {
-    const double reach = kNear * (glm::length(expected.cell[0]) + glm::length(expected.cell[1]) +
-                                  glm::length(expected.cell[2]));
-    const glm::dmat3 in_cells = glm::inverse(expected.cell);
+  std::optional<size_t> nearest(const Missing& missing) {
+    const Expected& expected = missing.expected;
+    const glm::dvec3 reach =
+        kNear * (glm::abs(expected.cell[0]) + glm::abs(expected.cell[1]) + glm::abs(expected.cell[2]));
     std::optional<size_t> best;
     double least = kNear;
-    auto candidate =
-        std::lower_bound(candidates_.begin(), candidates_.end(), Candidate{expected.at.x - reach, 0});
-    for (; candidate != candidates_.end() && candidate->first <= expected.at.x + reach; ++candidate) {
-      ++compared_;
-      const double distance = lengthOf(in_cells * (at_(candidate->second) - expected.at));
-      if (distance < least) least = distance, best = candidate->second;
-    }
+    compared_ +=
+        candidates_.forBox(expected.at - reach, expected.at + reach, [&](const NodeTree::Point& candidate) {
+          const double distance = lengthOf(missing.in_cells * (candidate.at - expected.at));
+          if (distance < least) least = distance, best = candidate.number;
+        });
     return best;
   }
 
   /// Finds nodes of a face by one map; how many.
   size_t joinFace(const BlockFace& face) {
-    std::vector<Place> missing;
+    std::vector<Missing> missing;
     forFace(face, [&](const Place& place, size_t node) {
-      if (!isKnown(node) && expected(face, place)) missing.push_back(place);
+      if (isKnown(node)) return;
+      if (const auto there = expected(face, place))
+        missing.push_back({place, *there, glm::inverse(there->cell)});
     });
     if (missing.empty() || compared_ > kMaxCompared) return 0;
     std::map<FaceMap, size_t> votes;
     const size_t step = std::max<size_t>(1, missing.size() / kVoters);
     for (size_t n = 0; n < missing.size(); n += step)
-      if (const auto node = nearest(*expected(face, missing[n]))) vote(missing[n], *node, votes);
+      if (const auto node = nearest(missing[n])) vote(missing[n].place, *node, votes);
     const Taken best = bestOf(face, missing, mapsFor(face, votes));
     for (const auto& [node, same] : best.nodes) same_[node] = static_cast<uint32_t>(same);
+    if (!best.nodes.empty() && collapsed(best.map) == 0) maps_.emplace_back(face, best.map);
     return best.nodes.size();
+  }
+  /// Finds nodes that nothing tells where to expect, since blanked ones lie behind them: by the maps of the others on their faces.
+  size_t joinBesideBlanks() {
+    size_t found = 0;
+    for (const auto& face_and_map : maps_) {
+      const BlockFace& face = face_and_map.first;
+      const FaceMap& map = face_and_map.second;
+      forFace(face, [&](const Place& place, size_t node) {
+        const auto to = nodeAt(map.to, {map.along[0].at(place), map.along[1].at(place)});
+        if (isKnown(node) || !to || !is_there_[*to] || expected(face, place)) return;
+        same_[node] = static_cast<uint32_t>(*to);
+        ++found;
+      });
+    }
+    return found;
   }
 
   /// The maps with the most votes, and those that lay whole faces on one another: where cells are thin and grid lines bend, the
@@ -216,9 +248,10 @@ class Joiner {
   struct Taken {
     std::vector<std::pair<size_t, size_t>> nodes;  // of the face, and the one there
     double farthest = 0;                           // cells
+    FaceMap map{};
   };
   /// The map that finds the most nodes; of several the least collapsed, then the nearest.
-  Taken bestOf(const BlockFace& face, const std::vector<Place>& missing,
+  Taken bestOf(const BlockFace& face, const std::vector<Missing>& missing,
                const std::vector<FaceMap>& maps) const {
     Taken best;
     int best_collapsed = 0;
@@ -230,6 +263,7 @@ class Joiner {
       if (is_first || std::tuple(best.nodes.size(), of_one, one.farthest) <
                           std::tuple(one.nodes.size(), best_collapsed, best.farthest)) {
         best = std::move(one);
+        best.map = map;
         best_collapsed = of_one;
       }
     }
@@ -269,15 +303,14 @@ class Joiner {
     return Place{index(face.u()), index(face.v())};
   }
 
-  Taken taken(const BlockFace& face, const std::vector<Place>& missing, const FaceMap& map) const {
+  Taken taken(const BlockFace& face, const std::vector<Missing>& missing, const FaceMap& map) const {
     Taken out;
-    for (const Place& place : missing) {
+    for (const auto& [place, there, in_cells] : missing) {
       const auto to = nodeAt(map.to, {map.along[0].at(place), map.along[1].at(place)});
       if (!to || !is_there_[*to]) continue;
-      const Expected there = *expected(face, place);
-      const double away = inCells(*to, there);
-      if (!(away <= kNear) && !(glm::length(at_(*to) - there.at) <= kMaxAside * glm::length(there.cell[0])))
-        continue;
+      const glm::dvec3 way = at_(*to) - there.at;
+      const double away = lengthOf(in_cells * way);
+      if (!(away <= kNear) && !(glm::length(way) <= kMaxAside * glm::length(there.cell[0]))) continue;
       out.nodes.push_back({*nodeAt(face, place), *to});
       out.farthest = std::max(out.farthest, away);
     }
@@ -288,8 +321,9 @@ class Joiner {
   const std::span<const uint8_t> is_there_;
   const std::function<glm::dvec3(size_t node)>& at_;
   std::vector<BlockFace> faces_;
-  std::vector<Candidate> candidates_;  // nodes of faces that have splats, by x
-  std::vector<uint32_t> same_;         // [node]: whose splat it has; kNobody: its own, or not known
+  NodeTree candidates_;         // nodes of faces that have splats
+  std::vector<uint32_t> same_;  // [node]: whose splat it has; kNobody: its own, or not known
+  std::vector<std::pair<BlockFace, FaceMap>> maps_;  // that have found nodes, but for collapsed ones
   uint64_t compared_ = 0;
 };
 
@@ -300,14 +334,16 @@ uint64_t joinBytes(const NodeLattice3& block) {
   constexpr uint64_t kNodeBytes =
       sizeof(uint8_t) + sizeof(uint32_t);  // whether it is there, and whose splat it has
   constexpr uint64_t kFaceBytes =
-      16 + sizeof(Place) + 2 * sizeof(size_t);  // a candidate, a missing one, and its partner
+      2 * NodeTree::kPointBytes + sizeof(Missing) +
+      2 * sizeof(size_t);  // a candidate (as its array doubles), a missing one, its partner
   return kNodeBytes * ni * nj * nk + 2 * kFaceBytes * (ni * nj + nj * nk + nk * ni);
 }
 
 std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,
-                                                       std::span<const uint8_t> is_there,
+                                                       std::span<const uint8_t> is_there, uint64_t count,
                                                        const std::function<glm::dvec3(size_t node)>& at) {
-  return Joiner(blocks, is_there, at).find();
+  if (count == 0) return std::vector<JoinedNode>();
+  return Joiner(blocks, is_there, at).find(count);
 }
 
 }  // namespace curvisplat

@@ -36,10 +36,11 @@ struct JoinedNode {
 /// The bytes that finding them takes for a block.
 uint64_t joinBytes(const NodeLattice3& block);
 
-/// The partners of all nodes for which is_there[node] is 0, in the order of the nodes; none if one is not found. `at`: where a node is.
+/// The partners of nodes for which is_there[node] is 0, in the order of the nodes: of `count` of them, the others are blanked. None if it
+/// cannot be told which these are. `at`: where a node is.
 /// Takes as long as some 10⁸ comparisons at most. Pure.
 std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,
-                                                       std::span<const uint8_t> is_there,
+                                                       std::span<const uint8_t> is_there, uint64_t count,
                                                        const std::function<glm::dvec3(size_t node)>& at);
 
 }  // namespace curvisplat

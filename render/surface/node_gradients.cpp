@@ -81,19 +81,22 @@ NodeGradients::Weighted NodeGradients::ofOne(size_t node) const {
     return Derivative{glm::dvec3(nodes_.position(other)) - here,
                       double{nodes_.value(other)} - double{nodes_.value(node)}};
   };
+  const GridNodes::OfAxes beside = nodes_.neighbours(block, node);
   std::array<Derivative, 3> along;
   for (size_t axis = 0; axis < 3; ++axis) {
-    const size_t stride = block.stride(axis), count = block.size[axis];
-    const size_t index = (node - block.first) / stride % count;
-    if (index > 0 && index + 1 < count) {
-      const std::array to{from_here(node - stride), from_here(node + stride)};
+    const auto& [before, after] = beside[axis];
+    if (beside[axis].areBoth(node)) {
+      const std::array to{from_here(before), from_here(after)};
       along[axis] = ofParabola(to, {-glm::length(to[0].place), glm::length(to[1].place)});
       continue;
     }
-    const auto inwards = [&](size_t n) { return index > 0 ? node - n * stride : node + n * stride; };
-    const double sign = index > 0 ? -1 : 1;  // blocks are passed through in one direction
-    const Derivative first = from_here(inwards(1));
-    const Derivative second = count > 2 ? from_here(inwards(2)) : first;
+    if (before == after) continue;  // nothing beside it
+    const bool backwards = beside[axis].hasBefore(node);
+    const size_t next = backwards ? before : after;
+    const auto beyond = nodes_.neighbours(block, next)[axis];
+    const double sign = backwards ? -1 : 1;  // blocks are passed through in one direction
+    const Derivative first = from_here(next);
+    const Derivative second = from_here(backwards ? beyond.before : beyond.after);
     const double a = glm::length(first.place), b = a + glm::length(second.place - first.place);
     along[axis] = ofParabola({first, second}, {sign * a, sign * b});
   }

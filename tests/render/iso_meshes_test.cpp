@@ -119,6 +119,54 @@ TEST_F(IsoMeshesTest, NodesAreFoundAgain) {
   EXPECT_LT(off_value.back(), 0.05);
 }
 
+/// An island in the middle, whose coast has corners and edges of all kinds, and a bottom of steps.
+bool isLand(const GridNode& n) {
+  const double i = double(n.i) - 22, j = double(n.j) - 19, k = double(n.k) - 16;
+  return i * i + j * j + k * k < 60 ||
+         double(n.k) > 28 + 4 * std::sin(0.4 * double(n.i)) + 3 * std::cos(0.5 * double(n.j));
+}
+
+TEST_F(IsoMeshesTest, NodesBesideBlankedOnesAreFoundAgain) {
+  const auto value = [](const GridNode& n) {
+    return std::sin(0.2 * double(n.i)) + std::cos(0.15 * double(n.j)) + 0.02 * double(n.k);
+  };
+  const CacheReader cache = converted([&](const GridNode& n) {
+    return NodeValues{bentPlace(n), {static_cast<float>(value(n))}, isLand(n)};
+  });
+  ASSERT_TRUE(GridNodes::canBeOf(cache.manifest()));
+  ASSERT_GT(cache.manifest().blanked_nodes, 1000u);
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
+  ASSERT_TRUE(nodes.areComplete());
+  std::vector<double> off_value, off_place;
+  size_t node = 0;
+  for (uint64_t k = 0; k < kNodes[2]; ++k)
+    for (uint64_t j = 0; j < kNodes[1]; ++j)
+      for (uint64_t i = 0; i < kNodes[0]; ++i, ++node) {
+        ASSERT_EQ(nodes.isBlank(node), isLand({0, i, j, k}));
+        const auto& [of_i, of_j, of_k] = nodes.neighbours(nodes.blocks()[0], node);
+        const bool at_coast = !of_i.areBoth(node) || !of_j.areBoth(node) || !of_k.areBoth(node);
+        const bool inside = i > 0 && j > 0 && k > 0 && i + 1 < kNodes[0] && j + 1 < kNodes[1];
+        if (nodes.isBlank(node) || !inside || !at_coast) continue;
+        const glm::dvec3 at = bentPlace({0, i, j, k});
+        const double cell = glm::length(bentPlace({0, i + 1, j, k}) - at);
+        off_place.push_back(glm::length(nodes.origin() + glm::dvec3(nodes.position(node)) - at) / cell);
+        off_value.push_back(std::abs(double{nodes.value(node)} - value({0, i, j, k})));
+      }
+  ASSERT_GT(off_place.size(), 1000u);
+  std::sort(off_place.begin(), off_place.end());
+  std::sort(off_value.begin(), off_value.end());
+  const size_t most = off_place.size() * 98 / 100;
+  fmt::print("places {} {} {}, values {} {} {}\n", off_place[off_place.size() / 2], off_place[most],
+             off_place.back(), off_value[off_value.size() / 2], off_value[most], off_value.back());
+  // In cells, and of a range of 3; only at coasts. The worst are nodes of which an octant or two are left.
+  EXPECT_LT(off_place[off_place.size() / 2], 0.01);
+  EXPECT_LT(off_place[most], 0.1);
+  EXPECT_LT(off_place.back(), 0.5);
+  EXPECT_LT(off_value[off_value.size() / 2], 0.002);
+  EXPECT_LT(off_value[most], 0.02);
+  EXPECT_LT(off_value.back(), 0.1);
+}
+
 TEST_F(IsoMeshesTest, PeaksAtAllPlacesAreClosed) {
   // Every fourth node, so that peaks lie at all places of the bricks; seen from a corner of eight bricks, too.
   for (const uint64_t shift : {0, 1}) {
@@ -243,6 +291,34 @@ TEST_F(IsoMeshesTest, BlocksThatMeetHaveOneSurface) {
   }
 }
 
+double areaOf(const TriangleMesh& mesh) {
+  double area = 0;
+  for (const auto& [a, b, c] : mesh.triangles)
+    area +=
+        0.5 * glm::length(glm::cross(corner(mesh, b) - corner(mesh, a), corner(mesh, c) - corner(mesh, a)));
+  return area;
+}
+
+TEST_F(IsoMeshesTest, ManySmallBlocksAreJoined) {
+  const auto source = [](uint64_t nodes) {
+    return FunctionGridSource(
+        std::vector<GridBlock>(64, gridBlock(nodes, nodes, nodes)), 1, [nodes](const GridNode& n) {
+          const double cells = double(nodes - 1);
+          const glm::dvec3 at(n.block % 4 + double(n.i) / cells, n.block / 4 % 4 + double(n.j) / cells,
+                              n.block / 16 + double(n.k) / cells);
+          return NodeValues{at, {float(glm::length(at - glm::dvec3(2.0)))}};
+        });
+  };
+  const CacheReader cache = converted(source(10));
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
+  ASSERT_TRUE(nodes.areComplete());
+  const auto mesh = contourCells(nodes, 1.5, {}, 1000000);
+  ASSERT_TRUE(mesh);
+  EXPECT_EQ(openEdges(*mesh), 0u);
+  EXPECT_EQ(doubledVertices(*mesh), 0u);
+  EXPECT_NEAR(areaOf(*mesh), 4 * std::numbers::pi * 1.5 * 1.5, 0.1);
+}
+
 TEST_F(IsoMeshesTest, DamagedLeavesAreNamed) {
   const CacheReader cache = converted([](const GridNode& n) {
     return NodeValues{{n.i, n.j, n.k}, {static_cast<float>(n.i)}};
@@ -297,15 +373,10 @@ TEST_F(IsoMeshesTest, ClipPlanesCutThem) {
 
 TEST_F(IsoMeshesTest, OtherCachesHaveNone) {
   const auto even = [](const GridNode& n) { return NodeValues{{n.i, n.j, n.k}, {static_cast<float>(n.i)}}; };
-  EXPECT_FALSE(GridNodes::canBeOf(converted(even, kNodes, Centring::kCell).manifest()));
-  const CacheReader blanked = converted([&](const GridNode& n) {
-    NodeValues values = even(n);
-    values.blank = n.i == 5 && n.j == 5;
-    return values;
-  });
-  EXPECT_FALSE(GridNodes::canBeOf(blanked.manifest()));
+  const CacheReader cells = converted(even, kNodes, Centring::kCell);
+  EXPECT_FALSE(GridNodes::canBeOf(cells.manifest()));
   IsoMeshes meshes;
-  EXPECT_EQ(meshes.of(blanked, {{5.5}, {}}, kNeverStopped), nullptr);
+  EXPECT_EQ(meshes.of(cells, {{5.5}, {}}, kNeverStopped), nullptr);
   const Manifest manifest = converted(even).manifest();
   ASSERT_TRUE(GridNodes::canBeOf(manifest));
   const auto with = [&](const auto& change) {
@@ -315,9 +386,45 @@ TEST_F(IsoMeshesTest, OtherCachesHaveNone) {
   };
   EXPECT_FALSE(with([](Manifest& m) { m.overlap = kOverlapOwner; }));
   EXPECT_FALSE(with([](Manifest& m) { m.stretch = kSteepStretch; }));
+  EXPECT_FALSE(with([](Manifest& m) { m.blanked_nodes = 1; }));  // as well as a splat of each node
   EXPECT_FALSE(with([](Manifest& m) { m.blocks.clear(); }));
   EXPECT_FALSE(with([](Manifest& m) { m.blocks[0] = {"", m.nodes, 1, 1}; }));  // a mesh
   EXPECT_FALSE(with([](Manifest& m) { m.blocks[0].ni = uint64_t{1} << 63; }));
+}
+
+TEST_F(IsoMeshesTest, CellsWithABlankedCornerAreLeftOut) {
+  // A ring of which a part is blanked, across where it closes on itself; its first nodes along i are also its last ones.
+  const auto place = [](const GridNode& n) {
+    const double angle = 2 * std::numbers::pi * double(n.i % 40) / 40, radius = 1 + 0.1 * double(n.j);
+    return glm::dvec3(radius * std::cos(angle), radius * std::sin(angle), 0.1 * double(n.k));
+  };
+  const auto field = [](const glm::dvec3& at) { return at.z; };
+  const auto is_blank = [](const GridNode& n) {
+    return (n.i % 40 < 3 || n.i % 40 > 37) && n.j > 3 && n.j < 8;
+  };
+  const CacheReader cache = converted(
+      [&](const GridNode& n) {
+        return NodeValues{place(n), {static_cast<float>(field(place(n)))}, is_blank(n)};
+      },
+      {41, 11, 11});
+  const Manifest& manifest = cache.manifest();
+  ASSERT_LT(manifest.splats, manifest.nodes - manifest.blanked_nodes);
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
+  ASSERT_TRUE(nodes.areComplete());
+  const auto mesh = contourCells(nodes, 0.53, {}, 100000);
+  ASSERT_TRUE(mesh);
+  // Two triangles in each cell of a layer of 40x10, less those around 5x4 nodes that are blanked: 6x5.
+  EXPECT_EQ(mesh->triangles.size(), 2u * (40 * 10 - 6 * 5));
+  EXPECT_EQ(doubledVertices(*mesh), 0u);
+  EXPECT_EQ(openEdges(*mesh), 2u * 40 + 2 * (6 + 5));
+  EXPECT_LT(largestTilt(*mesh, field), 1);
+  for (uint32_t n = 0; n < mesh->positions.size(); ++n) {
+    const glm::dvec3 at = corner(*mesh, n);
+    EXPECT_NEAR(at.z, 0.53, 0.001);
+    const double steps = std::atan2(at.y, at.x) * 20 / std::numbers::pi,
+                 j = 10 * (std::hypot(at.x, at.y) - 1);
+    EXPECT_FALSE(std::abs(steps) < 2.8 && j > 3.2 && j < 7.8) << steps << ' ' << j;
+  }
 }
 
 TEST_F(IsoMeshesTest, TooManyTrianglesAreNone) {
