@@ -125,17 +125,23 @@ struct FrameRenderer::State {
     return values.draw(plan, options, ignored, progress);
   }
 
+  /// Who waits for a quick picture: both may be null.
+  struct QuickFor {
+    Progress* progress = nullptr;
+    std::shared_ptr<CardPicture>* on_card = nullptr;
+  };
   Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
-                      FrameStatistics& statistics, bool& is_final, Progress* progress) {
+                      FrameStatistics& statistics, bool& is_final, const QuickFor& whom) {
     CURVISPLAT_CHECK(!options.ranks && "one process draws a quick picture");
     statistics = {};
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     QuickPlan quick =
         timed(statistics.plan_s, "plan", [&] { return planner.planQuick(camera, options, limits); });
     is_final = quick.isFinal();
-    pipeline.drawLayers(quick.plan, options, statistics, progress);
-    Image picture = pipeline.draw(quick.plan, options, statistics, progress);
-    return quick.size.isWhole() ? picture : quick.size.enlarge(picture);
+    pipeline.drawLayers(quick.plan, options, statistics, whom.progress);
+    Image picture = pipeline.draw(quick.plan, options, statistics, whom.progress, whom.on_card);
+    const bool is_left = whom.on_card && *whom.on_card;
+    return is_left || quick.size.isWhole() ? picture : quick.size.enlarge(picture);
   }
 
   const CacheReader& cache;
@@ -187,21 +193,20 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
                                         Progress* progress) {
   state_->pipeline.endPrefetch();
   bool is_final = false;
-  Image picture = state_->withBackends(options, [&] {
-    return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, progress);
-  });
+  Image picture = state_->withBackends(
+      options, [&] { return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, {progress}); });
   show(picture, is_final);
   if (is_final) return;
   picture = Image();
-  show(state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); }),
-       true);
+  show(state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); }), true);
 }
 
 Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options,
-                                   const QuickLimits& limits, FrameStatistics& statistics, bool& is_final) {
+                                   const QuickLimits& limits, FrameStatistics& statistics, bool& is_final,
+                                   std::shared_ptr<CardPicture>* on_card) {
   state_->pipeline.endPrefetch();
   return state_->withBackends(
-      options, [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, nullptr); });
+      options, [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, {nullptr, on_card}); });
 }
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
@@ -236,11 +241,12 @@ ScreenView FrameRenderer::screenView(const Camera& camera, const FrameOptions& o
   return state_->planner.screenView(camera, options, options.size);
 }
 
-StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend)
+StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend, GlSharing* window)
     : cache_(cache),
       scalars_(scalars),
       backend_(backend),
-      renderer_(std::make_unique<FrameRenderer>(cache, scalars, backend)) {}
+      window_(window),
+      renderer_(std::make_unique<FrameRenderer>(cache, scalars, makeBackend(backend, window))) {}
 
 StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars,
                        std::unique_ptr<PaintingBackend> backend)
@@ -250,7 +256,7 @@ StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars,
 
 /// Removes the renderer, which frees its memory and reads no more. Returns its backend, which may have replaced another.
 std::unique_ptr<PaintingBackend> StepPlayer::endRenderer() {
-  if (!renderer_) return makeBackend(backend_);  // the next one could not be made
+  if (!renderer_) return makeBackend(backend_, window_);  // the next one could not be made
   std::unique_ptr<PaintingBackend> backend = renderer_->takeBackend();
   renderer_.reset();
   return backend;

@@ -332,10 +332,10 @@ void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options
 }
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
-                          Progress* progress) {
+                          Progress* progress, std::shared_ptr<CardPicture>* on_card) {
   for (uint32_t least = 1; least <= kMaxRegions; least *= 4) {
     FrameStatistics drawn = statistics;
-    auto image = drawInRegions(least, plan, options, drawn, progress);
+    auto image = drawInRegions(least, plan, options, drawn, progress, on_card);
     if (!image) continue;
     statistics = std::move(drawn);
     return *std::move(image);
@@ -351,7 +351,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 /// Nothing where more splats wait in the painter's tiles than it has memory for: fewer do in smaller regions.
 std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePlan& plan,
                                                   const FrameOptions& options, FrameStatistics& statistics,
-                                                  Progress* progress) {
+                                                  Progress* progress, std::shared_ptr<CardPicture>* on_card) {
   std::optional<TraceScope> starting(std::in_place, "start frame");
   makePools(options);
   exchange_.reset();
@@ -384,7 +384,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
     const bool is_any = sweepNext(plan, options);
     starting.reset();
     startSlab(plan, is_any ? &regions.front() : nullptr, options);
-    image = paint(plan, regions, options, statistics, progress);
+    image = paint(plan, regions, options, statistics, progress, on_card);
   } catch (...) {
     pools_->workers.stop();
     try {
@@ -423,7 +423,8 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
 /// The stage "draw"; the first slab is begun. No picture where the ring was closed: a worker has failed, or a stop was
 /// requested.
 Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
-                           const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
+                           const FrameOptions& options, FrameStatistics& statistics, Progress* progress,
+                           std::shared_ptr<CardPicture>* on_card) {
   Image image;
   const size_t waiting = painting_ == backend_.get() ? pools_->budget.waiting_splats : aside_waiting_splats_;
   painting_->run([&](Painter& painter) {
@@ -451,7 +452,8 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
       advance();
       if (pools_->ring.isClosed()) return;
     } while (nextSlab(plan, regions, options, painter));
-    image = painter.end();
+    if (on_card) *on_card = painter.endOnCard();
+    if (!on_card || !*on_card) image = painter.end();
     overfull_ = painter.isOverfull();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
@@ -466,6 +468,9 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.card_peak_bytes = card.bytes;
     statistics.card_sent_bytes = card.sent_bytes;
     statistics.card_slabs = card.slabs;
+    statistics.card_read_bytes = card.read_bytes;
+    statistics.card_pixels_listed = card.pixels_listed;
+    statistics.card_pixels_blended = card.pixels_blended;
     if (!stored_.empty()) add(statistics, painter.store()->counts());
   });
   if (const ShadowGrid* const shadows = plan.settings.shadows.get()) {

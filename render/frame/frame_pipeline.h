@@ -116,9 +116,10 @@ class FramePipeline {
   /// Ends a prefetch. To be called before a frame, and before what it draws is changed.
   void endPrefetch();
   /// Fetches, prepares and draws. Memory is divided for a picture of options.size, which may be larger than
-  /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does.
+  /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does. `on_card`: the picture is left there if the
+  /// painter shares textures with a window (Painter::endOnCard()), and the image is empty; else it becomes null.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
-             Progress* progress);
+             Progress* progress, std::shared_ptr<CardPicture>* on_card = nullptr);
   /// Frames leave `bytes` of the memory to a further painter, for drawBy(), until it is called again. False,
   /// and they leave nothing, if the memory is too little for that. `waiting_splats`: what the painter gets of them
   /// (PaintResources).
@@ -165,7 +166,8 @@ class FramePipeline {
   void beginExchange(const FramePlan& plan, const FrameOptions& options);
   uint64_t exchangeBytes(const FrameOptions& options) const;
   std::optional<Image> drawInRegions(uint32_t least, const FramePlan& plan, const FrameOptions& options,
-                                     FrameStatistics& statistics, Progress* progress);
+                                     FrameStatistics& statistics, Progress* progress,
+                                     std::shared_ptr<CardPicture>* on_card);
   void stopStages();
   FrameBudget budgetOf(const FrameOptions& options) const;
   void fillStore(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
@@ -176,7 +178,7 @@ class FramePipeline {
   void makePools(const FrameOptions& options);
   void dropPools();
   Image paint(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
-              FrameStatistics& statistics, Progress* progress);
+              FrameStatistics& statistics, Progress* progress, std::shared_ptr<CardPicture>* on_card);
 
   const CacheReader& cache_;
   const size_t variable_;
