@@ -35,21 +35,23 @@ struct FrameRenderer::State {
         planner(cache_, scalars_),
         pipeline(cache_, scalars_, planner, std::move(backend)) {}
 
-  /// Draws by the next backend where one cannot go on; where the card refuses memory, by the same with less, once. Ranks would
-  /// have to agree on it.
+  /// Draws by the next backend where one cannot go on; where the card refuses memory, by the same with less, once. All ranks
+  /// draw again if one has to, each until it has no further backend.
   template <typename Draw>
-  Image withBackends(const FrameOptions& options, const Draw& draw) {
-    for (bool may_give_up = true;; may_give_up = false) {
+  Image withBackends(const Draw& draw) {
+    for (bool may_give_up = true;;) {
       std::string why;
       bool of_memory = false;
       try {
         return draw();
+      } catch (const OtherPainterFailure&) {
+        continue;
       } catch (const PainterFailure& failure) {
-        if (options.ranks) throw;
         why = failure.what();
         of_memory = dynamic_cast<const CardMemoryFailure*>(&failure) != nullptr;
       }
-      if (!of_memory || !may_give_up || !pipeline.giveCardMemoryUp()) pipeline.fallBack(why);
+      if (!of_memory || !std::exchange(may_give_up, false) || !pipeline.giveCardMemoryUp())
+        pipeline.fallBack(why);
     }
   }
 
@@ -178,14 +180,14 @@ bool FrameRenderer::drawsInSoftware() const {
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
   state_->pipeline.endPrefetch();
-  return state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); });
+  return state_->withBackends([&] { return state_->render(camera, options, statistics, progress); });
 }
 
 Image FrameRenderer::renderWithValues(const Camera& camera, const FrameOptions& options,
                                       FrameStatistics& statistics, PixelValues& values, Progress* progress) {
   state_->pipeline.endPrefetch();
   return state_->withBackends(
-      options, [&] { return state_->renderWithValues(camera, options, statistics, values, progress); });
+      [&] { return state_->renderWithValues(camera, options, statistics, values, progress); });
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
@@ -194,11 +196,11 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
   state_->pipeline.endPrefetch();
   bool is_final = false;
   Image picture = state_->withBackends(
-      options, [&] { return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, {progress}); });
+      [&] { return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, {progress}); });
   show(picture, is_final);
   if (is_final) return;
   picture = Image();
-  show(state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); }), true);
+  show(state_->withBackends([&] { return state_->render(camera, options, statistics, progress); }), true);
 }
 
 Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options,
@@ -206,7 +208,7 @@ Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& opt
                                    std::shared_ptr<CardPicture>* on_card) {
   state_->pipeline.endPrefetch();
   return state_->withBackends(
-      options, [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, {nullptr, on_card}); });
+      [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, {nullptr, on_card}); });
 }
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {

@@ -22,6 +22,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -29,6 +30,7 @@
 #include <vector>
 
 #include "render/backend/backend.h"
+#include "render/frame/enduring_painter.h"
 #include "render/frame/frame_memory.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_plan.h"
@@ -177,6 +179,7 @@ class FramePipeline {
   bool isLeftOut(uint32_t brick, const FramePlan& plan, const FrameOptions& options) const;
   void makePools(const FrameOptions& options);
   void dropPools();
+  bool isOfAll(const FrameOptions& options) const;
   Image paint(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
               FrameStatistics& statistics, Progress* progress, std::shared_ptr<CardPicture>* on_card);
 
@@ -199,6 +202,8 @@ class FramePipeline {
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn
   bool overfull_ = false;                    // the last picture: Painter::isOverfull()
+  std::exception_ptr failure_;               // of its painter, where several ranks draw; null: none
+  std::optional<EnduringPainter> enduring_;  // asked by workers until the frame has ended
   std::unique_ptr<ComputePermits> permits_;  // as many as the options said that threads were to be used
   uint64_t least_pager_bytes_ = 0;           // that the largest brick of any step so far needs
 

@@ -27,6 +27,7 @@
 #include "stream/model/border_code.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
+#include "tests/support/thread_ranks.h"
 
 namespace curvisplat {
 namespace {
@@ -448,6 +449,39 @@ TEST_F(FailingCard, LeavesItsPictureToQuadsOnceItWasReset) {
   EXPECT_NE(card->backendName().find("quads (the graphics card was reset while drawing)"), std::string::npos)
       << card->backendName();
   EXPECT_GE(compareImages(before, quads).psnr_db, 50);
+}
+
+/// Several ranks draw a picture, and the card of one of them fails in its midst: all draw it again, that one in another way.
+TEST_F(FailingCard, OfOneRankLeavesThePictureToTheOthersAndToQuads) {
+  FrameStatistics ignored;
+  const Image wanted = rendererBy(Backend::kCpu)->render(camera("iso"), options(0), ignored);
+  const std::pair<Faults, const char*> cases[] = {
+      {{.is_reset = true}, "quads (the graphics card was reset"},
+      {{.refusals = 100}, "quads (OpenGL has no memory left for"}};
+  for (const auto& [faults, expected] : cases)
+    for (const unsigned failing : {0u, 2u}) {
+      Image first, second;
+      std::string name;
+      runRanks(3, [&](Ranks& ranks) {
+        const bool fails = ranks.rank() == failing;
+        auto backend = fails ? std::make_unique<FailingBackend>() : makeBackend(Backend::kCpu);
+        FrameRenderer renderer(*cache_, DrawnScalars(0, TransferFunction::preset("viridis", -1, 1, 0.02)),
+                               std::move(backend));
+        if (fails) FailingBackend::faults = faults;
+        FrameOptions with = options(0);
+        with.ranks = &ranks;
+        FrameStatistics statistics;
+        Image a = renderer.render(camera("iso"), with, statistics),
+              b = renderer.render(camera("iso"), with, statistics);
+        if (fails) name = renderer.backendName();
+        if (!ranks.isFirst()) return;
+        first = std::move(a);
+        second = std::move(b);
+      });
+      EXPECT_GE(compareImages(first, wanted).psnr_db, 60) << expected;
+      EXPECT_EQ(first.rgba, second.rgba) << expected;
+      EXPECT_NE(name.find(expected), std::string::npos) << name;
+    }
 }
 
 TEST(Backends, GoOnWithQuadsAndThenByTheProcessor) {
