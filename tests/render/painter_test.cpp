@@ -523,7 +523,8 @@ TEST(GlTilePainter, HidesOnlyWhatNothingShinesThroughTo) {
 
 TEST(GlTilePainter, CountsWhatPixelsDo) {
   const ImageSize size{48, 40};
-  const ScreenSplat splat{21.3f, 17.8f, 3.0f, -1.0f, 2.0f, 0.08f, 0.55f, 0.2f, -0.1f, 0.03f, 0, 0, 0, 0, 0, 0};
+  const ScreenSplat splat{21.3f, 17.8f, 3.0f, -1.0f, 2.0f, 0.08f, 0.55f, 0.2f,
+                          -0.1f, 0.03f, 0,    0,     0,    0,     0,     0};
   uint64_t inside = 0;
   for (int y = 0; y < size.height; ++y)
     for (int x = 0; x < size.width; ++x) {
