@@ -4,6 +4,7 @@ the processor's painter with all cores, and the conversions that they need.
 
     bench/card_frames.py FOLDER [--sizes 1M,10M,50M] [--pictures 1920x1080,3840x2160] [--backends egl,egl-quads,cpu]
                          [--software] [--frames 5] [--threads N] [--json OUT.json] [--program BUNDLE/bin/curvisplat]
+    bench/card_frames.py FOLDER --counts [--grid FILE,FILE,...]   # what a card has to do, counted on any OpenGL 4.3
     bench/card_frames.py FOLDER --quick     # tiny sizes, OpenGL in software: a minute
 
 It needs Python alone and the program, which tools/packaging/bundle.sh brings with its libraries to a machine that has neither. It
@@ -29,10 +30,22 @@ them, of which medians are printed, from the program's own --stats:
 and below a row in compute shaders, of one frame: the parts of OpenGL's time; splats of bricks that stay on the card; splats in tiles (entries), and the bytes of memory that
 these take on paper: 32 an entry, which is written, sorted and read; 64 a splat to send it, and twice to read it. Each entry is looked at by the pixels of its tile, 16 where splats lean.
 
+With --counts nothing is timed: a frame of the wake of 1 M nodes and one of the half-annulus of 1 M, all splats drawn, and the default
+picture of the grid, if one is given, are counted at 1920x1080: splats drawn (with the pieces of those at borders), keys sorted (a splat
+in a tile), how often a pixel looks at a splat of its tile's list, and how often it blends one. From these:
+
+    project    GB: reads 68 bytes a stored splat, writes 64 a drawn one
+    list       reads those twice, writes 8 bytes a key; sort: reads and writes the keys
+    paint      reads 8 bytes of a key and 64 of its splat: tiles have 4x4 pixels where bricks are stored, all in one work group
+    picture    windows of depth, read and written once: 32 bytes a pixel; made into 8 bits: 20
+    least      milliseconds that an H200 takes for these bytes at 4.8 TB/s, and for the arithmetic (LOOK operations to look, BLEND to
+               blend, counted in the shader by hand) at 67 TFLOP/s: NVIDIA's figures. No card reaches either: it is a bound
+
 A backend that cannot be had is left out, and so is one that draws in software, unless --software is given.
 """
 import argparse
 import json
+import os
 import pathlib
 import re
 import statistics
@@ -41,6 +54,9 @@ import time
 import results
 from scaling import count_of
 
+# An H200's memory and arithmetic, as NVIDIA publishes them, and what a pixel does in render/gl/splat_shader.cpp.
+BYTES_PER_S, OPERATIONS_PER_S = 4.8e12, 67e12
+LOOK, BLEND = 12, 160
 HERE = pathlib.Path(__file__).resolve().parent
 MIB = 2**20
 WARM_UP = 2
@@ -189,6 +205,59 @@ def measure(arguments, size, picture, backend, cpu_s, out):
     return median["frame"]
 
 
+def wake_of(arguments, size):
+    wake = arguments.folder / f"wake_{size}"
+    cache = wake.with_suffix(".splats")
+    if not (cache / "manifest.json").exists():
+        results.run([arguments.program, "generate", "wake", "--size", size, "-o", wake])
+        results.run([arguments.program, "convert", f"{wake}.xyz", f"{wake}.fun", "-o", cache, "--overwrite"])
+    return cache
+
+
+def grid_of(arguments):
+    files = arguments.grid.split(",")
+    cache = arguments.folder / f"{pathlib.Path(files[0]).stem}.splats"
+    if not (cache / "manifest.json").exists():
+        results.run([arguments.program, "convert", *files, "-o", cache, "--overwrite"])
+    return cache
+
+
+def gigabytes_of(frame, pixels):
+    """What a frame moves on paper, by stage."""
+    entries, elements = frame["card_entries"], frame["splats_drawn"]
+    return {"project": 1e-9 * (68 * frame["card_splats"] + 64 * elements), "list": 1e-9 * (128 * elements + 8 * entries),
+            "sort": 1e-9 * 16 * entries, "paint": 1e-9 * 72 * entries, "picture": 1e-9 * 52 * pixels}
+
+
+def count(arguments, out):
+    """Prints what cards have to do for a few pictures."""
+    picture = "160x90" if arguments.quick else "1920x1080"
+    width, height = map(int, picture.split("x"))
+    plain = ["--lod-pixels", 0, "--classify", "pixel", "--view", "iso", "--tf", "viridis", "--range", "0,1", "--opacity", "0:0.02,1:0.02",
+             "--opacity-unit", 0.03]
+    edge = "24x16x12" if arguments.quick else "100x100x100"
+    scenes = [("wake", wake_of(arguments, edge), plain), ("half-annulus", cache_of(arguments, 8000 if arguments.quick else 10**6, out), plain)]
+    if arguments.grid:
+        scenes.append((pathlib.Path(arguments.grid.split(",")[0]).name, grid_of(arguments), []))
+    print(f"| {picture} | splats | keys sorted | pixels look | pixels blend | GB: project, list, sort, paint, picture | least, ms: bytes, arithmetic |\n"
+          "|---|---|---|---|---|---|---|")
+    told = arguments.folder / "counts.json"
+    for name, cache, options in scenes:
+        results.run([arguments.program, "render", cache, "-o", arguments.folder / "counted.pfm", "--stats", told, "--backend", "egl",
+                     "--card-memory", "1G", "--size", picture, "--memory", "2G", *options], env=os.environ | {"CURVISPLAT_COUNT_PIXELS": "1"})
+        frame = json.loads(told.read_text())["frames"][0]
+        moved = gigabytes_of(frame, width * height)
+        looks, blends = frame["card_pixels_listed"], frame["card_pixels_blended"]
+        bytes_ms = 1e3 * sum(moved.values()) * 1e9 / BYTES_PER_S
+        arithmetic_ms = 1e3 * (LOOK * looks + BLEND * blends) / OPERATIONS_PER_S
+        digits = results.three_digits
+        print(f"| {name} | {digits(1e-6 * frame['splats_drawn'])} M | {digits(1e-6 * frame['card_entries'])} M | {digits(1e-6 * looks)} M | "
+              f"{digits(1e-6 * blends)} M | {', '.join(digits(part) for part in moved.values())} | {digits(bytes_ms)}, {digits(arithmetic_ms)} |",
+              flush=True)
+        for field in ("card_entries", "card_pixels_listed", "card_pixels_blended"):
+            out.add(f"card_frames/{field}/scene:{name}", "1", [frame[field]])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
@@ -200,6 +269,8 @@ def main():
     parser.add_argument("--threads", type=int)
     parser.add_argument("--program", default=HERE.parent / "build/release/tools/curvisplat")
     parser.add_argument("--json")
+    parser.add_argument("--counts", action="store_true", help="count what a frame takes, and time nothing")
+    parser.add_argument("--grid", help="files of a real grid, for --counts")
     parser.add_argument("--quick", action="store_true", help="tiny sizes, in software, too")
     arguments = parser.parse_args()
     quick = arguments.quick
@@ -209,6 +280,11 @@ def main():
     arguments.frames = arguments.frames or (2 if quick else 5)
     arguments.folder.mkdir(parents=True, exist_ok=True)
     out = results.Results()
+    if arguments.counts:
+        count(arguments, out)
+        if arguments.json:
+            out.write(arguments.json, "card_frames", results.version_of(arguments.program))
+        return
     # The processor's painter first, since the others are compared with it.
     backends = sorted(usable_backends(arguments, out), key=lambda backend: backend != "cpu")
     beside = [backend for backend in backends if backend != "cpu"]

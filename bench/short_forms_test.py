@@ -100,9 +100,14 @@ class ShortForms(unittest.TestCase):
         lines = said.splitlines()
         self.assertRegex(lines[-3], row.format("cpu", "", "", ""))
         self.assertRegex(lines[-2], row.format("egl", r"\S+ ms", r"\S+ ms", r"\S+"))
-        self.assertRegex(lines[-1], r"^  list \S+ ms, sort \S+ ms, paint \S+ ms; [1-9]\d* entries, moved [1-9]\d*\.\d times")
+        self.assertRegex(lines[-1], r"^  project \S+ ms, list \S+ ms, sort \S+ ms, paint \S+ ms; \d+ splats of stored bricks, [1-9]\d* entries, ")
         for picture in ("plain", "clip planes", "slices", "two scalars"):
             self.assertRegex(said, rf"(?m)^\| {picture} \| \d+\.\d dB \|$")
+        counted = run("card_frames.py", FOLDER / "card", "--counts", "--quick").splitlines()
+        for line, scene in zip(counted[2:], ["wake", "half-annulus"], strict=True):
+            self.assertRegex(line, rf"^\| {scene} \| \S+ M \| \S+ M \| \S+ M \| \S+ M \| (\S+, ){{4}}\S+ \| \S+, \S+ \|$")
+            splats, keys, looks, blends = (float(cell.split()[0]) for cell in line.split("|")[2:6])
+            self.assertTrue(0 < splats < keys and 0 < blends < looks <= 16 * keys, line)
         names = {one["name"]: len(one["samples"]) for one in json.loads(told.read_text())["measurements"]}
         self.assertEqual(names["card_frames/gl_draw/splats:4K/picture:64x48/backend:egl"], 2)
         self.assertNotIn("card_frames/gl_draw/splats:4K/picture:64x48/backend:cpu", names)

@@ -19,13 +19,17 @@ std::string inBrackets(const std::string& why) {
 
 class GlBackend final : public PaintingBackend {
  public:
-  enum class Way { kQuads, kTilesOrQuads };
+  enum class Way { kQuads, kTiles, kTilesOrQuads };
 
-  /// `why`: this one and no better; empty: it is what was asked for.
-  GlBackend(GlLibrary library, Way way, const std::string& why = {})
-      : gl_(library), capacity_(GlTilePainter::Capacity::of(gl_.isSoftware())) {
-    gl_.run([&](const GlContext& context) { makePainter(context, way, why); });
+  /// `why`: quads, and nothing better; empty: they are what was asked for. `why_read`: compute shaders' pictures are read
+  /// back for a window that shows them; empty: there is none.
+  GlBackend(GlThread::MakeContext make, Way way, const std::string& why = {},
+            const std::string& why_read = {})
+      : gl_(std::move(make)), capacity_(GlTilePainter::Capacity::of(gl_.isSoftware())) {
+    gl_.run([&](const GlContext& context) { makePainter(context, way, why, why_read); });
   }
+  GlBackend(GlLibrary library, Way way, const std::string& why = {}, const std::string& why_read = {})
+      : GlBackend([library] { return makeOffscreenContext(library); }, way, why, why_read) {}
   ~GlBackend() override {
     gl_.run([this](const GlContext&) { painter_.reset(); });
   }
@@ -40,16 +44,17 @@ class GlBackend final : public PaintingBackend {
   }
 
  private:
-  void makePainter(const GlContext& context, Way way, const std::string& why) {
+  void makePainter(const GlContext& context, Way way, const std::string& why, const std::string& why_read) {
     name_ = context.name();
     std::string why_quads = inBrackets(why);
-    if (way == Way::kTilesOrQuads) {
+    if (way != Way::kQuads) {
       try {
         painter_ = std::make_unique<GlTilePainter>(context, capacity_);
         tiles_ = true;
-        name_ += ", compute shaders";
+        name_ += ", compute shaders" + inBrackets(why_read);
         return;
       } catch (const Error& error) {
+        if (way == Way::kTiles) throw;
         why_quads = inBrackets(error.what());
       }
     }
@@ -80,14 +85,32 @@ class CpuBackend final : public PaintingBackend {
   const std::string name_;
 };
 
+/// Compute shaders in a context of the window's. Throws Error if there are none, or if they would run elsewhere than EGL's.
+std::unique_ptr<GlBackend> makeSharingBackend(GlSharing& window) {
+  const std::string renderer = GlThread(GlLibrary::kEgl).renderer();
+  if (renderer != window.renderer())
+    throw Error("the window is drawn by {}, and pictures by {}", window.renderer(), renderer);
+  return std::make_unique<GlBackend>([&window] { return window.makeContext(); }, GlBackend::Way::kTiles);
+}
+
+std::unique_ptr<GlBackend> makeEglBackend(GlSharing* window) {
+  std::string why_read;
+  try {
+    if (window) return makeSharingBackend(*window);
+  } catch (const Error& error) {
+    why_read = fmt::format("read back for the window: {}", error.what());
+  }
+  return std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kTilesOrQuads, "", why_read);
+}
+
 /// EGL if it draws on a graphics card. Otherwise returns null and sets `why_not`.
-std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
+std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not, GlSharing* window = nullptr) {
   try {
     if (!eglMayHaveCard()) {
       why_not = "EGL finds no graphics card";
       return nullptr;
     }
-    auto card = std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kTilesOrQuads);
+    auto card = makeEglBackend(window);
     if (!card->isSoftware()) return card;
     why_not = card->name() + " is software";
   } catch (const Error& error) {
@@ -98,12 +121,12 @@ std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
 
 }  // namespace
 
-std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
+std::unique_ptr<PaintingBackend> makeBackend(Backend backend, GlSharing* window) {
   switch (backend) {
     case Backend::kOsmesa:
       return std::make_unique<GlBackend>(GlLibrary::kOsmesa, GlBackend::Way::kQuads);
     case Backend::kEgl:
-      return std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kTilesOrQuads);
+      return makeEglBackend(window);
     case Backend::kEglQuads:
       return std::make_unique<GlBackend>(GlLibrary::kEgl, GlBackend::Way::kQuads);
     case Backend::kCpu:
@@ -112,7 +135,7 @@ std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
       break;
   }
   std::string why_not;
-  if (auto card = makeCardBackend(why_not)) return card;
+  if (auto card = makeCardBackend(why_not, window)) return card;
   return std::make_unique<CpuBackend>();
 }
 

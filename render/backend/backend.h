@@ -16,6 +16,8 @@
 
 namespace curvisplat {
 
+class GlSharing;
+
 enum class Backend {
   kAutomatic,  // OpenGL if a graphics card draws, otherwise the processor
   kOsmesa,     // OpenGL in software
@@ -44,8 +46,10 @@ class PaintingBackend {
   virtual uint64_t bytes(ImageSize size, const PaintResources& resources) const = 0;
 };
 
-/// Throws Error if the backend is not available; the message names the library that was tried and its error.
-std::unique_ptr<PaintingBackend> makeBackend(Backend backend);
+/// Throws Error if the backend is not available; the message names the library that was tried and its error. `window`: of the
+/// window that shows the pictures, or null. Compute shaders share its textures (Painter::endOnCard()) if they run where it is
+/// drawn; otherwise the backend's name says why not. It outlives the backend.
+std::unique_ptr<PaintingBackend> makeBackend(Backend backend, GlSharing* window = nullptr);
 
 /// Replaces a backend that OpenGL has failed by the next one that this machine has: quads instead of compute shaders, unless it
 /// is software that would draw them in a card's place; then the processor. Its name tells `why`. The backend is never null.

@@ -31,6 +31,11 @@ class ReducedSize {
   ImageSize size() const { return reduced_; }
   /// Enlarges a picture of size() to the whole size, with linear interpolation between its pixels.
   Image enlarge(const Image& picture) const;
+  /// The part of a reduced picture's width, in its middle, that enlarge() shows of it: the picture may be a little wider.
+  static double shownWidth(ImageSize whole, ImageSize reduced) {
+    return static_cast<double>(whole.width) * reduced.height /
+           (static_cast<double>(whole.height) * reduced.width);
+  }
 
  private:
   ImageSize whole_, reduced_;

@@ -35,21 +35,23 @@ struct FrameRenderer::State {
         planner(cache_, scalars_),
         pipeline(cache_, scalars_, planner, std::move(backend)) {}
 
-  /// Draws by the next backend where one cannot go on; where the card refuses memory, by the same with less, once. Ranks would
-  /// have to agree on it.
+  /// Draws by the next backend where one cannot go on; where the card refuses memory, by the same with less, once. All ranks
+  /// draw again if one has to, each until it has no further backend.
   template <typename Draw>
-  Image withBackends(const FrameOptions& options, const Draw& draw) {
-    for (bool may_give_up = true;; may_give_up = false) {
+  Image withBackends(const Draw& draw) {
+    for (bool may_give_up = true;;) {
       std::string why;
       bool of_memory = false;
       try {
         return draw();
+      } catch (const OtherPainterFailure&) {
+        continue;
       } catch (const PainterFailure& failure) {
-        if (options.ranks) throw;
         why = failure.what();
         of_memory = dynamic_cast<const CardMemoryFailure*>(&failure) != nullptr;
       }
-      if (!of_memory || !may_give_up || !pipeline.giveCardMemoryUp()) pipeline.fallBack(why);
+      if (!of_memory || !std::exchange(may_give_up, false) || !pipeline.giveCardMemoryUp())
+        pipeline.fallBack(why);
     }
   }
 
@@ -125,17 +127,23 @@ struct FrameRenderer::State {
     return values.draw(plan, options, ignored, progress);
   }
 
+  /// Who waits for a quick picture: both may be null.
+  struct QuickFor {
+    Progress* progress = nullptr;
+    std::shared_ptr<CardPicture>* on_card = nullptr;
+  };
   Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
-                      FrameStatistics& statistics, bool& is_final, Progress* progress) {
+                      FrameStatistics& statistics, bool& is_final, const QuickFor& whom) {
     CURVISPLAT_CHECK(!options.ranks && "one process draws a quick picture");
     statistics = {};
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     QuickPlan quick =
         timed(statistics.plan_s, "plan", [&] { return planner.planQuick(camera, options, limits); });
     is_final = quick.isFinal();
-    pipeline.drawLayers(quick.plan, options, statistics, progress);
-    Image picture = pipeline.draw(quick.plan, options, statistics, progress);
-    return quick.size.isWhole() ? picture : quick.size.enlarge(picture);
+    pipeline.drawLayers(quick.plan, options, statistics, whom.progress);
+    Image picture = pipeline.draw(quick.plan, options, statistics, whom.progress, whom.on_card);
+    const bool is_left = whom.on_card && *whom.on_card;
+    return is_left || quick.size.isWhole() ? picture : quick.size.enlarge(picture);
   }
 
   const CacheReader& cache;
@@ -172,14 +180,14 @@ bool FrameRenderer::drawsInSoftware() const {
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
   state_->pipeline.endPrefetch();
-  return state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); });
+  return state_->withBackends([&] { return state_->render(camera, options, statistics, progress); });
 }
 
 Image FrameRenderer::renderWithValues(const Camera& camera, const FrameOptions& options,
                                       FrameStatistics& statistics, PixelValues& values, Progress* progress) {
   state_->pipeline.endPrefetch();
   return state_->withBackends(
-      options, [&] { return state_->renderWithValues(camera, options, statistics, values, progress); });
+      [&] { return state_->renderWithValues(camera, options, statistics, values, progress); });
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
@@ -187,21 +195,20 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
                                         Progress* progress) {
   state_->pipeline.endPrefetch();
   bool is_final = false;
-  Image picture = state_->withBackends(options, [&] {
-    return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, progress);
-  });
+  Image picture = state_->withBackends(
+      [&] { return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, {progress}); });
   show(picture, is_final);
   if (is_final) return;
   picture = Image();
-  show(state_->withBackends(options, [&] { return state_->render(camera, options, statistics, progress); }),
-       true);
+  show(state_->withBackends([&] { return state_->render(camera, options, statistics, progress); }), true);
 }
 
 Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options,
-                                   const QuickLimits& limits, FrameStatistics& statistics, bool& is_final) {
+                                   const QuickLimits& limits, FrameStatistics& statistics, bool& is_final,
+                                   std::shared_ptr<CardPicture>* on_card) {
   state_->pipeline.endPrefetch();
   return state_->withBackends(
-      options, [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, nullptr); });
+      [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, {nullptr, on_card}); });
 }
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
@@ -236,11 +243,12 @@ ScreenView FrameRenderer::screenView(const Camera& camera, const FrameOptions& o
   return state_->planner.screenView(camera, options, options.size);
 }
 
-StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend)
+StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend, GlSharing* window)
     : cache_(cache),
       scalars_(scalars),
       backend_(backend),
-      renderer_(std::make_unique<FrameRenderer>(cache, scalars, backend)) {}
+      window_(window),
+      renderer_(std::make_unique<FrameRenderer>(cache, scalars, makeBackend(backend, window))) {}
 
 StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars,
                        std::unique_ptr<PaintingBackend> backend)
@@ -250,7 +258,7 @@ StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars,
 
 /// Removes the renderer, which frees its memory and reads no more. Returns its backend, which may have replaced another.
 std::unique_ptr<PaintingBackend> StepPlayer::endRenderer() {
-  if (!renderer_) return makeBackend(backend_);  // the next one could not be made
+  if (!renderer_) return makeBackend(backend_, window_);  // the next one could not be made
   std::unique_ptr<PaintingBackend> backend = renderer_->takeBackend();
   renderer_.reset();
   return backend;

@@ -77,9 +77,10 @@ class FrameRenderer {
 
   /// Draws the best picture within `limits`, for a camera that moves. It is drawn with fewer pixels and
   /// enlarged if it has no detail for all of them. Sets `is_final` to whether render() would return the same
-  /// picture. Throws as render() does.
+  /// picture. Throws as render() does. `on_card`: as FramePipeline::draw(); that picture is not enlarged (ReducedSize).
   Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
-                      FrameStatistics& statistics, bool& is_final);
+                      FrameStatistics& statistics, bool& is_final,
+                      std::shared_ptr<CardPicture>* on_card = nullptr);
 
   /// Begins to read and decode, in the background, the bricks that render() with the same arguments will
   /// need, as far as they fit in the cache of bricks. The next frame or prefetch() ends it. Its errors are
@@ -122,8 +123,8 @@ class FrameRenderer {
 /// while values change. One caller at a time.
 class StepPlayer {
  public:
-  /// `cache` must outlive the player; it is at the step that is drawn. Throws Error as FrameRenderer.
-  StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend);
+  /// `cache` must outlive the player; it is at the step that is drawn. `window`: as makeBackend(). Throws Error as FrameRenderer.
+  StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend, GlSharing* window = nullptr);
   /// Draws by this backend, as long as it can.
   StepPlayer(CacheReader& cache, const DrawnScalars& scalars, std::unique_ptr<PaintingBackend> backend);
 
@@ -143,6 +144,7 @@ class StepPlayer {
   CacheReader& cache_;
   DrawnScalars scalars_;
   const Backend backend_ = Backend::kAutomatic;
+  GlSharing* const window_ = nullptr;
   std::unique_ptr<FrameRenderer> renderer_;
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <limits>
 #include <span>
@@ -332,10 +333,10 @@ void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options
 }
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
-                          Progress* progress) {
+                          Progress* progress, std::shared_ptr<CardPicture>* on_card) {
   for (uint32_t least = 1; least <= kMaxRegions; least *= 4) {
     FrameStatistics drawn = statistics;
-    auto image = drawInRegions(least, plan, options, drawn, progress);
+    auto image = drawInRegions(least, plan, options, drawn, progress, on_card);
     if (!image) continue;
     statistics = std::move(drawn);
     return *std::move(image);
@@ -351,7 +352,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 /// Nothing where more splats wait in the painter's tiles than it has memory for: fewer do in smaller regions.
 std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePlan& plan,
                                                   const FrameOptions& options, FrameStatistics& statistics,
-                                                  Progress* progress) {
+                                                  Progress* progress, std::shared_ptr<CardPicture>* on_card) {
   std::optional<TraceScope> starting(std::in_place, "start frame");
   makePools(options);
   exchange_.reset();
@@ -384,7 +385,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
     const bool is_any = sweepNext(plan, options);
     starting.reset();
     startSlab(plan, is_any ? &regions.front() : nullptr, options);
-    image = paint(plan, regions, options, statistics, progress);
+    image = paint(plan, regions, options, statistics, progress, on_card);
   } catch (...) {
     pools_->workers.stop();
     try {
@@ -396,9 +397,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
     throw;
   }
   throwIfStopped(options.stop);
-  uint64_t overfull = overfull_;
-  if (options.ranks) options.ranks->sum(std::span<uint64_t>(&overfull, 1));
-  if (overfull > 0) return {};
+  if (!isOfAll(options)) return {};
   if (progress) progress->end();
 
   const Cut& cut = plan.cut;
@@ -420,13 +419,27 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
   return image;
 }
 
+/// Whether the painters of all ranks have completed the picture; false if more splats waited in one than it had memory for.
+/// Throws what this rank's painter threw, or OtherPainterFailure if another rank's did.
+bool FramePipeline::isOfAll(const FrameOptions& options) const {
+  if (!options.ranks) return !overfull_;
+  std::array<uint64_t, 2> numbers{overfull_ ? 1u : 0u, failure_ ? 1u : 0u};
+  options.ranks->sum(numbers);
+  if (failure_) std::rethrow_exception(failure_);
+  if (numbers[1] > 0) throw OtherPainterFailure("the painter of another rank has failed");
+  return numbers[0] == 0;
+}
+
 /// The stage "draw"; the first slab is begun. No picture where the ring was closed: a worker has failed, or a stop was
 /// requested.
 Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> regions,
-                           const FrameOptions& options, FrameStatistics& statistics, Progress* progress) {
+                           const FrameOptions& options, FrameStatistics& statistics, Progress* progress,
+                           std::shared_ptr<CardPicture>* on_card) {
   Image image;
   const size_t waiting = painting_ == backend_.get() ? pools_->budget.waiting_splats : aside_waiting_splats_;
-  painting_->run([&](Painter& painter) {
+  failure_ = nullptr;
+  painting_->run([&](Painter& own) {
+    Painter& painter = options.ranks ? enduring_.emplace(own) : own;
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
                   {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers,
                    planner_.colourClasses(), static_cast<float>(plan.settings.view.low_pass_px2)},
@@ -451,8 +464,10 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
       advance();
       if (pools_->ring.isClosed()) return;
     } while (nextSlab(plan, regions, options, painter));
-    image = painter.end();
+    if (on_card) *on_card = painter.endOnCard();
+    if (!on_card || !*on_card) image = painter.end();
     overfull_ = painter.isOverfull();
+    if (options.ranks) failure_ = enduring_->failure();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
     statistics.draw_s = painter.drawSeconds();
@@ -466,6 +481,9 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.card_peak_bytes = card.bytes;
     statistics.card_sent_bytes = card.sent_bytes;
     statistics.card_slabs = card.slabs;
+    statistics.card_read_bytes = card.read_bytes;
+    statistics.card_pixels_listed = card.pixels_listed;
+    statistics.card_pixels_blended = card.pixels_blended;
     if (!stored_.empty()) add(statistics, painter.store()->counts());
   });
   if (const ShadowGrid* const shadows = plan.settings.shadows.get()) {

@@ -22,6 +22,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -29,6 +30,7 @@
 #include <vector>
 
 #include "render/backend/backend.h"
+#include "render/frame/enduring_painter.h"
 #include "render/frame/frame_memory.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_plan.h"
@@ -116,9 +118,10 @@ class FramePipeline {
   /// Ends a prefetch. To be called before a frame, and before what it draws is changed.
   void endPrefetch();
   /// Fetches, prepares and draws. Memory is divided for a picture of options.size, which may be larger than
-  /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does.
+  /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does. `on_card`: the picture is left there if the
+  /// painter shares textures with a window (Painter::endOnCard()), and the image is empty; else it becomes null.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
-             Progress* progress);
+             Progress* progress, std::shared_ptr<CardPicture>* on_card = nullptr);
   /// Frames leave `bytes` of the memory to a further painter, for drawBy(), until it is called again. False,
   /// and they leave nothing, if the memory is too little for that. `waiting_splats`: what the painter gets of them
   /// (PaintResources).
@@ -165,7 +168,8 @@ class FramePipeline {
   void beginExchange(const FramePlan& plan, const FrameOptions& options);
   uint64_t exchangeBytes(const FrameOptions& options) const;
   std::optional<Image> drawInRegions(uint32_t least, const FramePlan& plan, const FrameOptions& options,
-                                     FrameStatistics& statistics, Progress* progress);
+                                     FrameStatistics& statistics, Progress* progress,
+                                     std::shared_ptr<CardPicture>* on_card);
   void stopStages();
   FrameBudget budgetOf(const FrameOptions& options) const;
   void fillStore(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
@@ -175,8 +179,9 @@ class FramePipeline {
   bool isLeftOut(uint32_t brick, const FramePlan& plan, const FrameOptions& options) const;
   void makePools(const FrameOptions& options);
   void dropPools();
+  bool isOfAll(const FrameOptions& options) const;
   Image paint(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,
-              FrameStatistics& statistics, Progress* progress);
+              FrameStatistics& statistics, Progress* progress, std::shared_ptr<CardPicture>* on_card);
 
   const CacheReader& cache_;
   const size_t variable_;
@@ -197,6 +202,8 @@ class FramePipeline {
   std::vector<uint32_t> shared_numbers_;     // [part of the plan] its number in plan.shared
   size_t region_ = 0;                        // that is being drawn
   bool overfull_ = false;                    // the last picture: Painter::isOverfull()
+  std::exception_ptr failure_;               // of its painter, where several ranks draw; null: none
+  std::optional<EnduringPainter> enduring_;  // asked by workers until the frame has ended
   std::unique_ptr<ComputePermits> permits_;  // as many as the options said that threads were to be used
   uint64_t least_pager_bytes_ = 0;           // that the largest brick of any step so far needs
 

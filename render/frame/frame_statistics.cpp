@@ -63,7 +63,7 @@ constexpr Fields<PrepareStatistics, 19> kPrepare{{
     {"sweep_peak_bytes", &PrepareStatistics::sweep_peak_bytes},
 }};
 
-constexpr Fields<DrawStatistics, 17> kDraw{{
+constexpr Fields<DrawStatistics, 20> kDraw{{
     {"upload", &DrawStatistics::upload_s, Combined::kSum, kSeconds},
     {"draw", &DrawStatistics::draw_s, Combined::kSum, kSeconds},
     {"gl_draw", &DrawStatistics::gl_draw_s, Combined::kSum, kSeconds},
@@ -76,6 +76,9 @@ constexpr Fields<DrawStatistics, 17> kDraw{{
     {"card_peak_bytes", &DrawStatistics::card_peak_bytes},
     {"card_sent_bytes", &DrawStatistics::card_sent_bytes},
     {"card_slabs", &DrawStatistics::card_slabs},
+    {"card_read_bytes", &DrawStatistics::card_read_bytes},
+    {"card_pixels_listed", &DrawStatistics::card_pixels_listed},
+    {"card_pixels_blended", &DrawStatistics::card_pixels_blended},
     {"painter_waited", &DrawStatistics::painter_waited_s, Combined::kSum, kSeconds},
     {"splats_hidden", &DrawStatistics::splats_hidden},
     {"surfaces", &DrawStatistics::surfaces_s, Combined::kSum, kSeconds},

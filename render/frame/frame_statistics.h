@@ -61,7 +61,8 @@ struct DrawStatistics {
   uint64_t card_entries = 0, card_peak_bytes = 0;  // CardWork
   uint64_t card_splats = 0;                        // of bricks that stay on the card: read there
   uint64_t card_sent_bytes = 0, card_slabs = 0;    // CardWork
-  double painter_waited_s = 0;                     // for the workers
+  uint64_t card_read_bytes = 0, card_pixels_listed = 0, card_pixels_blended = 0;  // CardWork
+  double painter_waited_s = 0;                                                    // for the workers
   uint64_t splats_hidden = 0;  // left out behind others that are opaque; how many varies, as bricks_hidden
   double surfaces_s = 0;       // surfaces and slices, without reading and sampling bricks for slices
   uint64_t iso_splats = 0, iso_bricks = 0;  // that isosurfaces may lie in; in whole or in part

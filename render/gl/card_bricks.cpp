@@ -15,6 +15,8 @@ namespace {
 
 constexpr uint64_t kWordBytes = sizeof(uint32_t), kMinPageBytes = uint64_t{64} << 10;
 
+constexpr uint64_t kSlabs = 8;  // about the most that a picture takes where card memory is short
+
 constexpr uint64_t kSplatWords = sizeof(BrickPieces::Splat) / kWordBytes,
                    kPieceWords = sizeof(StoredPiece) / kWordBytes,
                    kPieceValueWords = sizeof(StoredPieceValues) / kWordBytes;
@@ -101,8 +103,13 @@ CardBricks::Room CardBricks::roomFor(std::span<const StoredPart> parts, uint64_t
     all += drawn;
     now += drawn;
     most = std::max(most, now);
+    // Slabs share what lies at the depth where one ends, up to `most`. With no more space than that, dozens of them would be
+    // needed; so there is more, and fewer bricks where memory is short. A buffer has no more space with fewer bricks: there a
+    // third of each slab has to be new.
+    const uint64_t few = most + all / kSlabs, slab = std::min(all, few),
+                   in_buffer = std::min(slab, most + most / 2);
     // The painter needs a part of the buffer of splats for those that are drawn beside the stored ones.
-    if (pages > granted_bytes_ || 2 * most > largest_ || pages + most > bytes) break;
+    if (pages > granted_bytes_ || 2 * in_buffer > largest_ || pages + slab > bytes) break;
     room = {room.parts + 1, pages, std::min({all, largest_ / 2, bytes - pages})};
   }
   return room;

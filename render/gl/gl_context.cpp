@@ -34,19 +34,21 @@ std::string describe(const std::string& library, const GlFunctions& gl) {
   return fmt::format("{} {}, {}, OpenGL {}", library, driver, text(gl, GL_RENDERER), version);
 }
 
-/// Knows software renderers by the names that they give themselves.
+}  // namespace
+
 bool isSoftwareRenderer(const std::string& renderer) {
   for (const char* name : {"llvmpipe", "softpipe", "SWR", "SwiftShader", "Software"})
     if (renderer.find(name) != std::string::npos) return true;
   return false;
 }
 
-}  // namespace
-
-GlContext::GlContext(const std::string& library, const GlFunctions::Lookup& lookup)
+GlContext::GlContext(const std::string& library, const GlFunctions::Lookup& lookup,
+                     std::shared_ptr<SharedBin> shared)
     : functions_(lookup),
       name_(describe(library, functions_)),
-      software_(isSoftwareRenderer(text(functions_, GL_RENDERER))) {}
+      renderer_(text(functions_, GL_RENDERER)),
+      software_(isSoftwareRenderer(renderer_)),
+      shared_(std::move(shared)) {}
 
 namespace {
 
@@ -165,10 +167,11 @@ std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library) {
   return library == GlLibrary::kEgl ? makeEglContext() : makeOsMesaContext();
 }
 
-GlThread::GlThread(GlLibrary library) : library_(library) {
+GlThread::GlThread(MakeContext make) : make_(std::move(make)) {
   keepMesaOffAFullDisk();
   const Job first = [this](const GlContext& context) {
     context_name_ = context.name();
+    renderer_ = context.renderer();
     software_ = context.isSoftware();
   };
   job_ = &first;  // loop() makes the context before it runs a job
@@ -209,7 +212,7 @@ void GlThread::loop() {
     lock.unlock();
     std::exception_ptr error;
     try {
-      if (!context) context = makeOffscreenContext(library_);
+      if (!context) context = make_();
       job(*context);
     } catch (...) {
       error = std::current_exception();

@@ -19,6 +19,8 @@
 
 namespace curvisplat {
 
+class SharedBin;
+
 /// A context that is current on the thread that made it, and is used and destroyed there only.
 class GlContext {
  public:
@@ -30,16 +32,37 @@ class GlContext {
   /// The library, the device and the version, such as "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits),
   /// OpenGL 4.5".
   const std::string& name() const { return name_; }
+  /// The name of what draws, OpenGL's GL_RENDERER: "llvmpipe (LLVM 15.0.6, 256 bits)".
+  const std::string& renderer() const { return renderer_; }
   /// Whether the processor draws, not a graphics card.
   bool isSoftware() const { return software_; }
+  /// The bin of the window's OpenGL that the context shares textures with (GlSharing); null: it shares none.
+  const std::shared_ptr<SharedBin>& shared() const { return shared_; }
 
  protected:
-  GlContext(const std::string& library, const GlFunctions::Lookup& lookup);
+  GlContext(const std::string& library, const GlFunctions::Lookup& lookup,
+            std::shared_ptr<SharedBin> shared = nullptr);
 
  private:
   GlFunctions functions_;
-  std::string name_;
+  std::string name_, renderer_;
   bool software_ = true;
+  std::shared_ptr<SharedBin> shared_;
+};
+
+/// Whether a renderer of this name is the processor: software renderers are known by the names that they give themselves.
+bool isSoftwareRenderer(const std::string& renderer);
+
+/// The OpenGL of a window, for painters on other threads whose pictures it shows without a copy (card_picture.h). Outlives
+/// the contexts. Any thread.
+class GlSharing {
+ public:
+  virtual ~GlSharing() = default;
+  /// GlContext::renderer() of the window.
+  virtual const std::string& renderer() const = 0;
+  /// Makes a context that shares the window's textures, current on the calling thread. Throws Error, which says why there
+  /// is none. One at a time.
+  virtual std::unique_ptr<GlContext> makeContext() = 0;
 };
 
 /// Turns off Mesa's file of compiled shaders if the disk of the user's cache folder is full. Mesa maps that
@@ -72,8 +95,10 @@ std::unique_ptr<GlContext> makeOsMesaContext();
 /// for.
 class GlThread {
  public:
-  /// Starts the thread, named "gl", and makes the context on it. Throws what makeOffscreenContext() throws.
-  explicit GlThread(GlLibrary library);
+  using MakeContext = std::function<std::unique_ptr<GlContext>()>;
+  /// Starts the thread, named "gl", and makes the context on it. Throws what `make` throws.
+  explicit GlThread(MakeContext make);
+  explicit GlThread(GlLibrary library) : GlThread([library] { return makeOffscreenContext(library); }) {}
   ~GlThread();
   GlThread(const GlThread&) = delete;
   GlThread& operator=(const GlThread&) = delete;
@@ -82,8 +107,9 @@ class GlThread {
   /// Runs `job` on the thread and waits for its end. Throws what it throws. One caller at a time.
   void run(const Job& job);
 
-  /// GlContext::name() and isSoftware() of the context.
+  /// GlContext::name(), renderer() and isSoftware() of the context.
   const std::string& contextName() const { return context_name_; }
+  const std::string& renderer() const { return renderer_; }
   bool isSoftware() const { return software_; }
 
  private:
@@ -95,8 +121,8 @@ class GlThread {
   std::exception_ptr error_ GUARDED_BY(mutex_);  // of the last job
   bool stopping_ GUARDED_BY(mutex_) = false;
 
-  const GlLibrary library_;
-  std::string context_name_;
+  const MakeContext make_;
+  std::string context_name_, renderer_;
   bool software_ = true;
   std::thread thread_;
 };

@@ -51,6 +51,7 @@ namespace curvisplat {
   X(EnableVertexAttribArray, PFNGLENABLEVERTEXATTRIBARRAYPROC) \
   X(EndQuery, PFNGLENDQUERYPROC)                               \
   X(FenceSync, PFNGLFENCESYNCPROC)                             \
+  X(Flush, PFNGLFLUSHPROC)                                     \
   X(FramebufferRenderbuffer, PFNGLFRAMEBUFFERRENDERBUFFERPROC) \
   X(FramebufferTextureLayer, PFNGLFRAMEBUFFERTEXTURELAYERPROC) \
   X(GenBuffers, PFNGLGENBUFFERSPROC)                           \
@@ -77,6 +78,7 @@ namespace curvisplat {
   X(TexBuffer, PFNGLTEXBUFFERPROC)                             \
   X(TexImage2D, PFNGLTEXIMAGE2DPROC)                           \
   X(TexParameteri, PFNGLTEXPARAMETERIPROC)                     \
+  X(TexSubImage3D, PFNGLTEXSUBIMAGE3DPROC)                     \
   X(Uniform1f, PFNGLUNIFORM1FPROC)                             \
   X(Uniform1i, PFNGLUNIFORM1IPROC)                             \
   X(Uniform2f, PFNGLUNIFORM2FPROC)                             \
@@ -85,7 +87,8 @@ namespace curvisplat {
   X(VertexAttribDivisor, PFNGLVERTEXATTRIBDIVISORPROC)         \
   X(VertexAttribIPointer, PFNGLVERTEXATTRIBIPOINTERPROC)       \
   X(VertexAttribPointer, PFNGLVERTEXATTRIBPOINTERPROC)         \
-  X(Viewport, PFNGLVIEWPORTPROC)
+  X(Viewport, PFNGLVIEWPORTPROC)                               \
+  X(WaitSync, PFNGLWAITSYNCPROC)
 
 // These are null, or fail, if the context is older than 4.3: see whyNoCompute().
 #define CURVISPLAT_GL_4_3_FUNCTIONS(X)               \
@@ -99,6 +102,7 @@ namespace curvisplat {
   X(GetTexImage, PFNGLGETTEXIMAGEPROC)               \
   X(MapBufferRange, PFNGLMAPBUFFERRANGEPROC)         \
   X(MemoryBarrier, PFNGLMEMORYBARRIERPROC)           \
+  X(TexStorage2D, PFNGLTEXSTORAGE2DPROC)             \
   X(TexStorage3D, PFNGLTEXSTORAGE3DPROC)             \
   X(Uniform1ui, PFNGLUNIFORM1UIPROC)                 \
   X(Uniform2i, PFNGLUNIFORM2IPROC)                   \

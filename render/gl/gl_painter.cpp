@@ -4,6 +4,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -113,6 +114,7 @@ struct GlPainter::State {
   };
   std::deque<InFlight> in_flight;
   double upload_s = 0, draw_s = 0, gl_draw_s = 0;
+  uint64_t read_bytes = 0;
 
   void allocate(ImageSize wanted, int windows);
   void useRecords(bool with_colours);
@@ -194,6 +196,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   state_->staged.assign(kMaxRecords, {});
   const bool same_size = size == state_->size;
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
+  state_->read_bytes = 0;
   state_->tables.load(size, table, shading);
   state_->allocate(size, state_->tables.windows());
   if (!same_size || !state_->bins || resources.waiting_splats != state_->waiting_splats) {
@@ -339,6 +342,7 @@ Image GlPainter::end() {
                   &drawn[4 * state.size.pixels() * n]);
   }
   gl.check("reading the picture");
+  state_->read_bytes = std::span(drawn).size_bytes();
   return state.tables.composite(drawn, true, state.background, state.threads);
 }
 
@@ -351,7 +355,7 @@ double GlPainter::drawSeconds() const {
 }
 
 CardWork GlPainter::cardWork() const {
-  return {.draw_s = state_->gl_draw_s};
+  return {.draw_s = state_->gl_draw_s, .read_bytes = state_->read_bytes};
 }
 
 }  // namespace curvisplat

@@ -1,18 +1,18 @@
 #include "render/gl/gl_tile_painter.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <functional>
 #include <map>
 #include <vector>
 
-#include "render/gl/card_bricks.h"
+#include "render/gl/card_picture.h"
 #include "render/gl/gl_functions.h"
 #include "render/gl/gl_tile_lists.h"
+#include "render/gl/pixel_counts.h"
 #include "render/gl/splat_shader.h"
 #include "render/gl/splat_tables.h"
-#include "render/project/splat_chooser.h"
+#include "render/gl/stored_splats.h"
+#include "render/gl/tile_picture.h"
 #include "render/project/tile_key.h"
 #include "stream/base/error.h"
 #include "stream/base/os.h"
@@ -54,39 +54,30 @@ TileBox tilesOver(const TileBox& pixels, int side) {
 
 }  // namespace
 
-struct GlTilePainter::State final : BrickStore {
-  State(const GlFunctions& functions, const Capacity& capacity_, bool software)
-      : gl(functions),
-        default_bytes(software ? 0 : defaultCardBytes(functions, os::availableMemory())),
-        capacity(software ? capacity_ : within(functions, default_bytes, capacity_)),
+struct GlTilePainter::State {
+  State(const GlContext& context, const Capacity& capacity_, uint64_t default_bytes)
+      : gl(context.functions()),
+        capacity(context.isSoftware() ? capacity_ : within(gl, default_bytes, capacity_)),
         tables(gl),
         lists(gl, timers),
-        splats(gl),
-        closed(gl),
-        bricks(gl, capacity_.buffer_bytes),
-        windows(makeTexture(gl)),
-        framebuffer(makeFramebuffer(gl)),
-        drawn(makeBuffer(gl)) {}
+        stored(gl,
+               {default_bytes, capacity.buffer_bytes, (kMaxRecords + capacity.splats) * sizeof(ScreenSplat)},
+               tables, timers, kProject),
+        picture(gl),
+        card_pictures(gl, context.shared()) {}
 
   const GlFunctions& gl;
-  const uint64_t default_bytes;
   const Capacity capacity;
   std::map<SplatShaderKind, GlProgram> programs;  // each compiled when it is first needed
   SplatTables tables;
   GlTimers timers{gl, kStages};
   GlTileLists lists;
-  CardBuffer splats, closed;  // closed: pixels of each small tile, then of each large one, that take no more
-  CardBricks bricks;
-  size_t stored = 0;  // elements of `splats` for those projected from bricks; the batch follows
-  std::vector<CardSlab> slabs;
-  size_t slab = 0;  // the one that is projected there
-  std::function<void()> project_slab;
-  GlObject windows, framebuffer, drawn;  // drawn: the windows, where the processor can read them
-  ImageSize size{0, 0};
-  int window_count = 0;
+  StoredSplats stored;
+  TilePicture picture;
+  CardPictures card_pictures;
+  PixelCounts pixel_counts{gl};
   unsigned threads = 0;
   glm::vec4 background{0};
-  const ClassificationTable* table = nullptr;
   std::stop_token stop;
 
   TileBox clip{};                  // pixels
@@ -96,47 +87,18 @@ struct GlTilePainter::State final : BrickStore {
   bool painted = false;  // something of the tiles that are drawn now
   uint32_t before = 0;   // the front up to which
   std::atomic<bool> overfull = false;
-  std::unique_ptr<std::atomic<uint8_t>[]> hidden;  // [large tile]
   double upload_s = 0, draw_s = 0;
-  uint64_t window_bytes = 0, most_bytes = 0;  // on the card
-  uint64_t sent_bytes = 0;                    // CardBricks::sentBytes() when the last picture ended
-  uint64_t frame_sent_bytes = 0;
-
-  void open(uint64_t content, const StepPosition& step) override { bricks.open(content, step); }
-  size_t makeRoom(std::span<const StoredPart> parts, uint64_t bytes) override {
-    return bricks.makeRoom(parts, bytes, splats, otherBytes());
-  }
-  bool giveMemoryUp() override {
-    if (!bricks.giveMemoryUp()) return false;
-    splats.release();
-    return true;
-  }
-  uint64_t defaultBytes() const override { return default_bytes; }
-  bool has(uint32_t brick) const override { return bricks.has(brick); }
-  void put(const StoredPart& part, const GeometryArrays<const float>& geometry, const BrickValues& values,
-           const BrickPieces& pieces) override {
-    bricks.put(part, geometry, values, pieces);
-  }
-  void drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
-                  std::span<const StoredPart> parts) override;
-  ProjectionCounts counts() const override { return stored > 0 ? bricks.counts() : ProjectionCounts{}; }
+  uint64_t most_bytes = 0;  // on the card
+  uint64_t sent_bytes = 0, read_bytes = 0;
 
   const GlProgram& program();
-  void allocate(ImageSize wanted, int count);
-  void openTiles();
-  CardTiles tilesOf(bool small) const;
-  /// `splats` has these behind the stored ones, or more where more wait.
-  uint64_t otherBytes() const { return (kMaxRecords + capacity.splats) * sizeof(ScreenSplat); }
-  size_t largeTiles() const { return TileSet::tilesOf(size, kLargeTile); }
   void paintBatch(bool last);
   void paintSlabs(bool last);
-  void goToSlab(size_t wanted);
   void upload();
   void paintBox(const ListedSplats& listed, const CardTiles& tiles, const TileBox& box);
   void paintLists(const CardTiles& tiles, const TileBox& box);
   void keepWaiting(uint32_t front);
-  void lookAtClosed();
-  std::span<const float> readWindows();
+  void finish();
 };
 
 GlTilePainter::GlTilePainter(const GlContext& context)
@@ -144,59 +106,24 @@ GlTilePainter::GlTilePainter(const GlContext& context)
 
 GlTilePainter::GlTilePainter(const GlContext& context, const Capacity& capacity) {
   if (const std::string why = context.functions().whyNoCompute(); !why.empty()) throw Error("{}", why);
-  state_ = std::make_unique<State>(context.functions(), capacity, context.isSoftware());
+  const uint64_t default_bytes =
+      context.isSoftware() ? 0 : defaultCardBytes(context.functions(), os::availableMemory());
+  state_ = std::make_unique<State>(context, capacity, default_bytes);
   // A driver that refuses the most demanding shader is to be known of now.
   const SplatShaderKind all{true, true, true, true, true, PixelLayers::kMaxWindows};
   state_->programs.emplace(all, GlProgram(state_->gl, splatTileShader(all)));
-  if (state_->default_bytes > 0) state_->bricks.compile();
+  if (default_bytes > 0) state_->stored.compile();
   state_->gl.check("setting up the painter");
 }
 
 GlTilePainter::~GlTilePainter() = default;
 
 const GlProgram& GlTilePainter::State::program() {
-  const SplatShaderKind kind = tables.kind();
+  SplatShaderKind kind = tables.kind();
+  kind.counts = pixel_counts.areWanted();
   auto found = programs.find(kind);
   if (found == programs.end()) found = programs.emplace(kind, GlProgram(gl, splatTileShader(kind))).first;
   return found->second;
-}
-
-void GlTilePainter::State::allocate(ImageSize wanted, int count) {
-  if (wanted == size && count == window_count) return;
-  GLint most = 0;
-  gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
-  if (wanted.width > most || wanted.height > most)
-    throw Error(
-        "an image of {}x{} pixels is larger than this OpenGL draws (at most {}x{}); ask for a smaller --size",
-        wanted.width, wanted.height, most, most);
-  size = {0, 0};
-  windows = makeTexture(gl);
-  gl.BindTexture(GL_TEXTURE_2D_ARRAY, windows.name());
-  gl.TexStorage3D(GL_TEXTURE_2D_ARRAY, 1, GL_RGBA32F, wanted.width, wanted.height, count);
-  closed.reserve((TileSet::tilesOf(wanted, kSmallTile) + TileSet::tilesOf(wanted, kLargeTile)) *
-                 sizeof(uint32_t));
-  gl.check("the picture");
-  window_bytes = 4 * sizeof(float) * wanted.pixels() * static_cast<uint64_t>(count);
-  gl.BindBuffer(GL_PIXEL_PACK_BUFFER, drawn.name());
-  gl.BufferData(GL_PIXEL_PACK_BUFFER, static_cast<GLsizeiptr>(window_bytes), nullptr, GL_STREAM_READ);
-  gl.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-  gl.check("the picture that is read");
-  hidden = std::make_unique<std::atomic<uint8_t>[]>(TileSet::tilesOf(wanted, kLargeTile));
-  size = wanted;
-  window_count = count;
-}
-
-/// Nothing is painted, and every pixel lets everything through.
-void GlTilePainter::State::openTiles() {
-  gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
-  gl.ClearColor(0, 0, 0, 1);
-  for (int n = 0; n < window_count; ++n) {
-    gl.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, windows.name(), 0, n);
-    gl.Clear(GL_COLOR_BUFFER_BIT);
-  }
-  closed.clear();
-  gl.check("beginning a frame");
-  for (size_t tile = 0; tile < largeTiles(); ++tile) hidden[tile].store(0, std::memory_order_relaxed);
 }
 
 void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
@@ -205,17 +132,16 @@ void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const Cla
   state.timers.reset();
   state.lists.resetCounts();
   state.upload_s = state.draw_s = 0;
+  state.sent_bytes = state.read_bytes = 0;
   state.tables.load(size, table, shading);
-  state.allocate(size, state.tables.windows());
-  state.openTiles();
+  state.picture.begin(size, state.tables.windows());
+  state.stored.begin(table);
+  state.pixel_counts.begin(size);
   state.background = background;
   state.stop = resources.stop;
   state.threads = resources.threads;
   state.clip = {0, 0, size.width, size.height};
   state.batch.assign(kMaxRecords, kNoSplat);
-  state.stored = 0;
-  state.slabs.clear();
-  state.table = &table;
   state.painted = false;
   state.waiting = 0;
   state.most_waiting = resources.waiting_splats;
@@ -228,37 +154,16 @@ void GlTilePainter::drawOnly(const TileSet& tiles) {
   state.paintBatch(true);
   const TileBox box = tiles.box();
   constexpr int kSide = kSharedTileSide;
+  const ImageSize size = state.picture.size();
   state.clip = intersectionOf({box.x0 * kSide, box.y0 * kSide, box.x1 * kSide, box.y1 * kSide},
-                              {0, 0, state.size.width, state.size.height});
+                              {0, 0, size.width, size.height});
   state.painted = false;
   state.before = 0;
-  state.goToSlab(0);
+  state.stored.goToFirstSlab();
 }
 
 BrickStore* GlTilePainter::store() {
-  return state_.get();
-}
-
-void GlTilePainter::State::drawStored(const ProjectionSettings& settings, const DepthKeys& keys,
-                                      std::span<const StoredPart> parts) {
-  const StageTimer timer(upload_s, "project bricks");
-  slabs = bricks.beginFrame(parts);
-  for (const CardSlab& each : slabs) stored = std::max(stored, each.elements);
-  project_slab = [this, &settings, &keys] {
-    timers.measure(kProject, [&] {
-      if (slabs[slab].elements < stored) splats.fill(stored * sizeof(ScreenSplat), kNoSplat.l11);
-      bricks.project(settings, keys, slabs[slab], tables, SplatChooser::largestScalar(*table), splats);
-    });
-  };
-  splats.reserve(stored * sizeof(ScreenSplat) + otherBytes());
-  slab = 0;
-  project_slab();
-}
-
-void GlTilePainter::State::goToSlab(size_t wanted) {
-  if (stored == 0 || slab == wanted) return;
-  slab = wanted;
-  project_slab();
+  return &state_->stored;
 }
 
 void GlTilePainter::draw(std::span<const ScreenSplat> splats) {
@@ -285,10 +190,10 @@ void GlTilePainter::State::paintBatch(bool last) {
     records.insert(records.begin(), batch.back());
     batch.pop_back();
   }
-  const bool is_any = batch.size() > kMaxRecords || (last && stored > 0);
+  const bool is_any = batch.size() > kMaxRecords || (last && stored.elements() > 0);
   if (is_any && !stop.stop_requested() && !overfull) {
     const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
-    lookAtClosed();
+    picture.lookAtClosed();
     upload();
     if (overfull) {
       batch.resize(kMaxRecords);
@@ -312,42 +217,29 @@ void GlTilePainter::State::paintBatch(bool last) {
 void GlTilePainter::State::paintSlabs(bool last) {
   const std::span<const ScreenSplat> all = std::span(batch).subspan(kMaxRecords);
   const uint32_t front = last ? CardBricks::kLastKey : all.back().first;
-  const bool ordered = stored > 0 || waiting > 0 || std::any_of(all.begin(), all.end(), leans);
-  const CardTiles tiles = tilesOf(ordered);
+  const bool ordered = stored.elements() > 0 || waiting > 0 || std::any_of(all.begin(), all.end(), leans);
+  const CardTiles tiles = picture.tiles(ordered);
   const TileBox box = tilesOver(clip, tiles.side);
-  size_t earlier = painted ? stored + kMaxRecords + waiting : 0;
+  const size_t elements = stored.elements() + batch.size();
+  size_t earlier = painted ? stored.elements() + kMaxRecords + waiting : 0;
   for (;;) {
-    const uint32_t until = stored > 0 ? std::min(front, slabs[slab].front) : front;
+    const uint32_t until = std::min(front, stored.front());
     const ListedSplats listed{
-        &splats, static_cast<uint32_t>(stored + batch.size()), static_cast<uint32_t>(earlier), before, until,
+        &stored.buffer(), static_cast<uint32_t>(elements), static_cast<uint32_t>(earlier), before, until,
         ordered};
     if (clip.x0 < clip.x1 && clip.y0 < clip.y1) paintBox(listed, tiles, box);
     before = until;
     painted = true;
     if (until == front) return;
-    goToSlab(slab + 1);
-    earlier = stored + batch.size();
+    stored.goToNextSlab();
+    earlier = elements;
   }
 }
 
-CardTiles GlTilePainter::State::tilesOf(bool small) const {
-  const auto small_tiles = static_cast<uint32_t>(TileSet::tilesOf(size, kSmallTile));
-  return {small ? kSmallTile : kLargeTile, size, &closed, small ? 0 : small_tiles};
-}
-
+/// The picture is overfull where OpenGL has no buffer for what waits: smaller regions of it need less.
 void GlTilePainter::State::upload() {
   const StageTimer timer(upload_s, "upload splats");
-  const std::span<const ScreenSplat> all = batch;
-  const uint64_t bytes = (stored + std::max(all.size(), capacity.splats + kMaxRecords)) * sizeof(ScreenSplat);
-  if (stored > 0 && bytes > CardBuffer::largest(gl)) {  // smaller regions of the picture need less
-    overfull = true;
-    return;
-  }
-  if (bytes > splats.bytes()) {  // more wait than there was space for
-    splats.reserve(bytes);
-    if (stored > 0) project_slab();
-  }
-  splats.write(stored * sizeof(ScreenSplat), all);
+  if (!stored.write(batch, std::max(batch.size(), capacity.splats + kMaxRecords))) overfull = true;
 }
 
 /// Paints a box, in halves if there are more entries than there is space for.
@@ -366,8 +258,7 @@ void GlTilePainter::State::paintBox(const ListedSplats& listed, const CardTiles&
   }
   lists.make(listed, tiles, box, entries);
   timers.measure(kPaint, [&] { paintLists(tiles, box); });
-  most_bytes = std::max(most_bytes, 2 * window_bytes + splats.bytes() + closed.bytes() + lists.cardBytes() +
-                                        bricks.cardBytes());
+  most_bytes = std::max(most_bytes, picture.cardBytes() + stored.cardBytes() + lists.cardBytes());
 }
 
 void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box) {
@@ -379,13 +270,10 @@ void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box
   gl.Uniform2i(painting.uniform("origin"), pixels.x0, pixels.y0);
   gl.Uniform1i(painting.uniform("side"), tiles.side);
   gl.Uniform1i(painting.uniform("columns"), box.columns());
-  const CardTiles small = tilesOf(true), large = tilesOf(false);
-  gl.Uniform3i(painting.uniform("closed_places"), small.columns(), large.columns(),
-               static_cast<GLint>(large.closed_begin));
-  splats.bind(0);
+  stored.buffer().bind(0);
   lists.bind();
-  closed.bind(3);
-  gl.BindImageTexture(0, windows.name(), 0, GL_TRUE, 0, GL_READ_WRITE, GL_RGBA32F);
+  picture.bind(painting);
+  pixel_counts.bind();
   const auto groups = [&](int count) {
     return static_cast<GLuint>((count * tiles.side + kGroupSide - 1) / kGroupSide);
   };
@@ -415,71 +303,42 @@ void GlTilePainter::State::keepWaiting(uint32_t front) {
   batch.resize(kMaxRecords);
 }
 
-/// Finds which large tiles take no more, for hides(), by what was painted before: nothing has to be waited
-/// for.
-void GlTilePainter::State::lookAtClosed() {
-  std::vector<uint32_t> pixels(largeTiles());
-  closed.bind();
-  gl.GetBufferSubData(GL_SHADER_STORAGE_BUFFER,
-                      static_cast<GLintptr>(tilesOf(false).closed_begin * sizeof(uint32_t)),
-                      static_cast<GLsizeiptr>(std::span(pixels).size_bytes()), pixels.data());
-  const int columns = TileSet::tilesAlong(size.width, kLargeTile);
-  for (size_t tile = 0; tile < pixels.size(); ++tile) {
-    const int x = static_cast<int>(tile) % columns * kLargeTile,
-              y = static_cast<int>(tile) / columns * kLargeTile;
-    const int all = std::min(kLargeTile, size.width - x) * std::min(kLargeTile, size.height - y);
-    hidden[tile].store(pixels[tile] == static_cast<uint32_t>(all), std::memory_order_relaxed);
-  }
-}
-
 bool GlTilePainter::hides(const ScreenBox& box) const {
-  const State& state = *state_;
-  if (state.overfull.load(std::memory_order_relaxed)) return true;  // the picture will be drawn again
-  if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return false;
-  const auto at = [](float pixel, int pixels) {
-    return static_cast<int>(std::clamp(pixel, 0.0f, static_cast<float>(pixels - 1))) / kLargeTile;
-  };
-  const ImageSize size = state.size;
-  const int columns = TileSet::tilesAlong(size.width, kLargeTile);
-  for (int row = at(box.y0, size.height); row <= at(box.y1, size.height); ++row)
-    for (int column = at(box.x0, size.width); column <= at(box.x1, size.width); ++column)
-      if (!state.hidden[static_cast<size_t>(row * columns + column)].load(std::memory_order_relaxed))
-        return false;
-  return true;
+  // An overfull picture will be drawn again.
+  return state_->overfull.load(std::memory_order_relaxed) || state_->picture.hides(box);
 }
 
-/// Returns the windows, which are valid until the buffer is unmapped. They go through a buffer that the card itself
-/// writes, since drivers copy into other memory much slower.
-std::span<const float> GlTilePainter::State::readWindows() {
-  gl.BindTexture(GL_TEXTURE_2D_ARRAY, windows.name());
-  gl.GetTexImage(GL_TEXTURE_2D_ARRAY, 0, GL_RGBA, GL_FLOAT, nullptr);
-  const void* const mapped =
-      gl.MapBufferRange(GL_PIXEL_PACK_BUFFER, 0, static_cast<GLsizeiptr>(window_bytes), GL_MAP_READ_BIT);
-  gl.check("reading the picture");
-  return {static_cast<const float*>(mapped), window_bytes / sizeof(float)};
+/// Waits for the card's clock, and takes the counts of the frame.
+void GlTilePainter::State::finish() {
+  timers.finish();
+  pixel_counts.finish();
+  sent_bytes = stored.takeSentBytes();
 }
 
 Image GlTilePainter::end() {
   State& state = *state_;
   state.paintBatch(true);
   const StageTimer timer(state.draw_s, "draw (OpenGL)");
-  const GlFunctions& gl = state.gl;
-  gl.BindBuffer(GL_PIXEL_PACK_BUFFER, state.drawn.name());
-  struct Release {  // where there is no memory for the picture, too
-    const GlFunctions& gl;
-    bool is_mapped = false;
-    ~Release() {
-      if (is_mapped) gl.UnmapBuffer(GL_PIXEL_PACK_BUFFER);
-      gl.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-    }
-  } release{gl};
-  const std::span<const float> drawn = state.readWindows();
-  release.is_mapped = true;
-  gl.checkReset("drawing");
-  state.timers.finish();
-  state.frame_sent_bytes = state.bricks.sentBytes() - state.sent_bytes;
-  state.sent_bytes = state.bricks.sentBytes();
-  return state.tables.composite(drawn, false, state.background, state.threads);
+  Image image;
+  state.picture.read([&](std::span<const float> drawn) {
+    state.finish();
+    state.read_bytes = drawn.size_bytes();
+    image = state.tables.composite(drawn, false, state.background, state.threads);
+  });
+  return image;
+}
+
+std::shared_ptr<CardPicture> GlTilePainter::endOnCard() {
+  State& state = *state_;
+  if (!state.card_pictures.canShare()) return nullptr;
+  state.paintBatch(true);
+  const StageTimer timer(state.draw_s, "draw (OpenGL)");
+  auto made = state.card_pictures.make(state.picture, state.tables, state.background);
+  state.most_bytes = std::max(state.most_bytes, state.picture.cardBytes() + state.stored.cardBytes() +
+                                                    state.lists.cardBytes() + made->bytes());
+  state.finish();
+  state.gl.checkReset("drawing");
+  return made;
 }
 
 bool GlTilePainter::isOverfull() const {
@@ -487,7 +346,7 @@ bool GlTilePainter::isOverfull() const {
 }
 
 double GlTilePainter::uploadSeconds() const {
-  return state_->upload_s;
+  return state_->upload_s + state_->stored.seconds();
 }
 
 double GlTilePainter::drawSeconds() const {
@@ -505,8 +364,11 @@ CardWork GlTilePainter::cardWork() const {
           paint_s,
           state_->lists.listedEntries(),
           state_->most_bytes,
-          state_->frame_sent_bytes,
-          state_->slabs.size()};
+          state_->sent_bytes,
+          state_->stored.slabs(),
+          state_->read_bytes,
+          state_->pixel_counts.listed(),
+          state_->pixel_counts.blended()};
 }
 
 uint64_t GlTilePainter::bytes(ImageSize size, const PaintResources& resources, const Capacity& capacity) {

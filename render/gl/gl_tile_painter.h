@@ -2,11 +2,11 @@
 // tiles that their ellipses touch, each list is sorted by their keys there (tile_key.h), and every pixel goes through the
 // list of its tile, front to back in registers, until nothing shines through.
 //
-//   draw -> batch -> GlTileLists: lists -> splatTileShader: windows of depth, an image each -> end: the picture
+//   draw -> batch -> GlTileLists: lists -> splatTileShader -> TilePicture -> end: the picture, or endOnCard: a texture
 //
 // A batch is collected in memory and sent at once; splats that its front cuts through stay for the next (tile_queues.h
 // says why). Where its entries do not fit into `entries`, its tiles are drawn in several boxes. Neither how splats are
-// batched nor the boxes change a bit. Stored bricks (card_bricks.h) are projected into the buffer before the batch; each
+// batched nor the boxes change a bit. Stored bricks (stored_splats.h) are projected into the buffer before the batch; each
 // batch lists what they have up to its front.
 // Lives on the context's thread, but for hides(). Not built for: more than one frame at a time.
 #pragma once
@@ -45,6 +45,7 @@ class GlTilePainter final : public Painter {
   BrickStore* store() override;
   bool hides(const ScreenBox& box) const override;
   Image end() override;
+  std::shared_ptr<CardPicture> endOnCard() override;
 
   double uploadSeconds() const override;
   double drawSeconds() const override;

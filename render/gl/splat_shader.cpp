@@ -337,6 +337,10 @@ uniform int side;      // of the tiles
 uniform int columns;   // of the box
 uniform ivec3 closed_places;  // columns of the picture's small tiles, and of its large ones; where those begin
 const float kSaturated = 1.0 / 4096.0;
+#if COUNTS
+layout(std430, binding = COUNTS_BINDING) buffer Counts { uvec2 counts[]; };  // [large tile]: splats looked at, splats blended
+uvec2 counted = uvec2(0);
+#endif
 
 Record recordOf(int n) {
   return Record(uintBitsToFloat(splats[4 * n]), uintBitsToFloat(splats[4 * n + 1]), uintBitsToFloat(splats[4 * n + 2].xy));
@@ -355,11 +359,17 @@ void main() {
 #endif
   for (uint at = range.x; at < range.y && seen[0].w >= kSaturated; ++at) {
     int n = int(entries[at].y);
+#if COUNTS
+    ++counted.x;
+#endif
     Record splat = recordOf(n);
     vec2 d = vec2(pixel) + 0.5 - splat.part0.xy;
     vec2 u = vec2(d.x / splat.part0.z, (d.y - splat.part0.w * (d.x / splat.part0.z)) / splat.part1.x);
     float rho2 = dot(u, u);
     if (rho2 >= support * support) continue;
+#if COUNTS
+    ++counted.y;
+#endif
     uvec2 tail = splats[4 * n + 2].zw;  // skew, along
     // Zeros where it has none: what the driver leaves in them is computed with, if only times 0.
     Record next = Record(vec4(0.0), vec4(0.0), vec2(0.0)), beyond = next;
@@ -385,6 +395,11 @@ void main() {
     seen[0] = vec4(seen[0].rgb + seen[0].w * adds.rgb, seen[0].w * (1.0 - adds.w));
 #endif
   }
+#if COUNTS
+  int counts_at = pixel.y / LARGE_TILE * closed_places.y + pixel.x / LARGE_TILE;
+  atomicAdd(counts[counts_at].x, counted.x);
+  atomicAdd(counts[counts_at].y, counted.y);
+#endif
   for (int n = 0; n < WINDOWS; ++n) imageStore(windows, ivec3(pixel, n), seen[n]);
   if (seen[0].w >= kSaturated) return;
   atomicAdd(closed[pixel.y / SMALL_TILE * closed_places.x + pixel.x / SMALL_TILE], 1u);
@@ -396,8 +411,9 @@ std::string kindOf(const SplatShaderKind& kind) {
   return fmt::format(
       "#define PER_PIXEL {}\n#define LOG_SCALE {}\n#define LAYERED {:d}\n#define WINDOWS {}\n#define "
       "COLOURED "
-      "{:d}\n#define COLOUR_LOG_SCALE {}\n",
-      kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kind.coloured, kind.colour_log_scale);
+      "{:d}\n#define COLOUR_LOG_SCALE {}\n#define COUNTS {:d}\n#define COUNTS_BINDING {}\n",
+      kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kind.coloured, kind.colour_log_scale,
+      kind.counts, kPixelCountsBinding);
 }
 
 std::string recordTags() {

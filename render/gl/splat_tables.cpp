@@ -92,6 +92,29 @@ void SplatTables::loadLayers() {
   gl_.check("loading the depths of surfaces");
 }
 
+int SplatTables::loadLayerColours(const GlObject& texture, GLint unit) const {
+  if (!layers_) return 0;
+  size_t count = 0;
+  for (int y = 0; y < size_.height; ++y)
+    for (int x = 0; x < size_.width; ++x) count = std::max(count, layers_->at(x, y).size());
+  gl_.ActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
+  gl_.BindTexture(GL_TEXTURE_2D_ARRAY, texture.name());
+  gl_.TexStorage3D(GL_TEXTURE_2D_ARRAY, 1, GL_RGBA32F, size_.width, size_.height,
+                   static_cast<GLsizei>(count));
+  std::vector<glm::vec4> colours(size_.pixels());
+  for (size_t n = 0; n < count; ++n) {
+    auto colour = colours.begin();
+    for (int y = 0; y < size_.height; ++y)
+      for (int x = 0; x < size_.width; ++x) {
+        const std::span<const PixelLayer> layers = layers_->at(x, y);
+        *colour++ = n < layers.size() ? layers[n].colour : glm::vec4(0.0f);
+      }
+    gl_.TexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, static_cast<GLint>(n), size_.width, size_.height, 1,
+                      GL_RGBA, GL_FLOAT, colours.data());
+  }
+  return static_cast<int>(count);
+}
+
 SplatShaderKind SplatTables::kind() const {
   return {.per_pixel = shading_.per_pixel,
           .log_scale = table_->logScale(),

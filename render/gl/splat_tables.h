@@ -37,6 +37,9 @@ class SplatTables {
   /// Sets the frame's uniforms of a program of that kind, which is then in use.
   void use(const GlProgram& program) const;
 
+  /// Loads the colours of the pixels' layers into the texture, an array of as many pictures as a pixel has layers at most, bound
+  /// to the unit. Returns how many.
+  int loadLayerColours(const GlObject& texture, GLint unit) const;
   /// The frame's picture. `drawn` [windows() pictures, one after the other]: colours, and transmittances or, by
   /// `opacities`, one minus those. `threads`: that share the work; 0: one per core.
   Image composite(std::span<const float> drawn, bool opacities, const glm::vec4& background,

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <span>
 #include <stop_token>
 
@@ -23,6 +24,7 @@
 namespace curvisplat {
 
 class BrickStore;
+class CardPicture;
 
 /// The resources that a painter may use for a frame. OpenGL's driver does not keep to them.
 struct PaintResources {
@@ -60,6 +62,9 @@ struct CardWork {
   uint64_t bytes = 0;       // the most memory that OpenGL's objects have taken so far
   uint64_t sent_bytes = 0;  // of bricks that stay on the card: sent for this frame
   uint64_t slabs = 0;       // of depth, in which stored bricks were projected
+  uint64_t read_bytes = 0;  // of the picture, by the processor
+  uint64_t pixels_listed = 0,
+           pixels_blended = 0;  // PixelCounts (render/gl/pixel_counts.h); 0 unless they are wanted
 };
 
 /// Draws the splats of a frame. One frame at a time.
@@ -98,6 +103,9 @@ class Painter {
   virtual bool isOverfull() const { return false; }
   /// How many of the splats given to draw() since begin() were left out because they are hidden completely.
   virtual uint64_t hiddenSplats() const { return 0; }
+  /// Does what end() does, but leaves the picture on the card, for the window that the painter shares textures with. Returns
+  /// null if it shares none; then end() has to be called.
+  virtual std::shared_ptr<CardPicture> endOnCard() { return nullptr; }
 };
 
 }  // namespace curvisplat

@@ -18,4 +18,10 @@ class CardMemoryFailure final : public PainterFailure {
   using PainterFailure::PainterFailure;
 };
 
+/// The painter of another rank has failed. This rank draws the same picture again with the others, by its own painter.
+class OtherPainterFailure final : public PainterFailure {
+ public:
+  using PainterFailure::PainterFailure;
+};
+
 }  // namespace curvisplat

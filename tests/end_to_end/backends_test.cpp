@@ -26,10 +26,22 @@ void PrintTo(const BackendScene& scene, std::ostream* out) {
   for (const std::string& option : scene.options) *out << ' ' << option;
 }
 
+/// Returns what EGL draws with here, or why it does not.
+std::string eglOf(const ProgramResult& system) {
+  for (const auto& backend : nlohmann::json::parse(system.out).at("backends"))
+    if (backend.at("name") == "egl") return backend.at("found").get<std::string>();
+  return {};
+}
+
+/// "card": EGL, with bricks that stay on the card.
+Words optionsOf(const std::string& backend) {
+  return backend == "card" ? Words{"--backend", "egl", "--card-memory", "64M"} : Words{"--backend", backend};
+}
+
 class EveryScene : public ProgramTest, public testing::WithParamInterface<BackendScene> {
  protected:
   Image render(const std::string& backend, const Words& view, const std::string& function) {
-    return pictureOf(file("a.splats"), file("a.pfm"), Words{"--backend", backend, "--tf", function} + view);
+    return pictureOf(file("a.splats"), file("a.pfm"), optionsOf(backend) + Words{"--tf", function} + view);
   }
 };
 
@@ -46,14 +58,20 @@ TEST_P(EveryScene, IsTheSameByOpenGlAndByTheProcessor) {
   run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
   const std::vector<Words> views{
       {}, {"--view", "-z"}, {"--view", "+x"}, {"--view-angle", "60"}, {"--lod-pixels", "8"}};
+  static const bool has_tiles =
+      eglOf(run({"info", "--system", "--json"})).find("compute shaders") != std::string::npos;
   // Usually each view with a quarter of the scenes, each function with half of the views.
   static size_t combination = 0;
   for (const auto& view : views)
     for (const std::string function : {"viridis", "cool-warm"}) {
       if (!faults::isTried(combination++, 7)) continue;
-      const ImageDifference difference =
-          compareImages(render("osmesa", view, function), render("cpu", view, function));
-      EXPECT_GE(difference.psnr_db, 50) << function << ' ' << testing::PrintToString(view);
+      const Image cpu = render("cpu", view, function);
+      const std::string what = function + ' ' + testing::PrintToString(view);
+      EXPECT_GE(compareImages(render("osmesa", view, function), cpu).psnr_db, 50) << what;
+      if (!has_tiles) continue;
+      const Image card = render("card", view, function);
+      EXPECT_GE(compareImages(card, cpu).psnr_db, 60) << what;
+      EXPECT_EQ(render("card", view, function).rgba, card.rgba) << what;
     }
 }
 
@@ -77,11 +95,9 @@ const Words kAround[] = {
 
 class DrawnWake : public ProgramTest {
  protected:
-  /// "card": EGL, with bricks that stay on the card.
   Image drawn(const std::string& backend, const Words& view, const Words& more) const {
-    const Words how =
-        backend == "card" ? Words{"--backend", "egl", "--card-memory", "64M"} : Words{"--backend", backend};
-    Words words = how + Words{"--range", "0,1", "--view", "iso", "--background", "white"} + view;
+    Words words =
+        optionsOf(backend) + Words{"--range", "0,1", "--view", "iso", "--background", "white"} + view;
     for (const std::string& option : more) words.push_back(option == "sheet.obj" ? file(option) : option);
     return pictureOf(file("wake.splats"), file("a.pfm"), words, "160x120");
   }
@@ -127,32 +143,25 @@ TEST_F(DrawnWake, KeepsBricksOnTheCardAsItIsTold) {
     return jsonOf(file("s.json")).at("frames").at(0).at("card_splats").get<uint64_t>();
   };
   EXPECT_EQ(storedWith({"--backend", "cpu", "--card-memory", "64M"}), 0u);
-  const auto report = nlohmann::json::parse(run({"info", "--system", "--json"}).out);
-  for (const auto& backend : report.at("backends"))
-    if (backend.at("name") == "egl" &&
-        backend.at("found").dump().find("compute shaders") != std::string::npos) {
-      EXPECT_GT(storedWith({"--backend", "egl", "--card-memory", "64M"}), 0u);
-      EXPECT_EQ(storedWith({"--backend", "egl", "--card-memory", "0"}), 0u);
-    }
+  if (eglOf(run({"info", "--system", "--json"})).find("compute shaders") != std::string::npos) {
+    EXPECT_GT(storedWith({"--backend", "egl", "--card-memory", "64M"}), 0u);
+    EXPECT_EQ(storedWith({"--backend", "egl", "--card-memory", "0"}), 0u);
+  }
   expectRefused({"render", file("wake.splats"), "-o", file("b.png"), "--card-memory", "much"}, 2,
                 {"--card-memory much: expected a size such as 512M"});
 }
 
 // Mesa can be told to have an older OpenGL.
 TEST_F(DrawnWake, HasQuadsWhereThereAreNoComputeShaders) {
-  const auto eglOf = [] {
-    const auto report = nlohmann::json::parse(run({"info", "--system", "--json"}).out);
-    for (const auto& backend : report.at("backends"))
-      if (backend.at("name") == "egl") return backend.at("found").get<std::string>();
-    return std::string();
-  };
-  if (eglOf().find("Mesa") == std::string::npos && eglOf().find("llvmpipe") == std::string::npos)
-    GTEST_SKIP() << eglOf();
-  expectSays(eglOf(), "compute shaders");
+  const auto found_now = [] { return eglOf(run({"info", "--system", "--json"})); };
+  const std::string before = found_now();
+  if (before.find("Mesa") == std::string::npos && before.find("llvmpipe") == std::string::npos)
+    GTEST_SKIP() << before;
+  expectSays(before, "compute shaders");
   madeCache(file("wake"), "wake", "24x16x12", {"--scalar", "f"});
   const Image quads = drawn("egl-quads", {}, {});
   setenv("MESA_GL_VERSION_OVERRIDE", "3.3", 1);
-  const std::string found = eglOf();
+  const std::string found = found_now();
   const Image instead = drawn("egl", {}, {});
   unsetenv("MESA_GL_VERSION_OVERRIDE");
   expectSays(found, "quads (compute shaders need OpenGL 4.3)");

@@ -4,15 +4,19 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "render/backend/backend.h"
 #include "render/frame/frame.h"
+#include "render/gl/card_bricks.h"
 #include "render/gl/card_buffer.h"
 #include "render/gl/gl_context.h"
 #include "render/gl/gl_tile_painter.h"
@@ -23,6 +27,7 @@
 #include "stream/model/border_code.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
+#include "tests/support/thread_ranks.h"
 
 namespace curvisplat {
 namespace {
@@ -367,6 +372,26 @@ TEST_F(FailingCard, ProjectsInSlabsWhatItsBuffersDoNotHoldAtOnce) {
   }
 }
 
+TEST_F(FailingCard, ProjectsInSlabsWhatItsMemoryDoesNotHoldAtOnce) {
+  writeLatticeCache(folder_ / "lattice.splats", -0.5, {0.03, 0.02, 0.01});
+  open("lattice.splats");
+  FrameOptions large = options(64 * kMiB);
+  large.size = {600, 500};
+  FrameStatistics whole, slabs;
+  const auto card = renderer();
+  const Image wanted = card->render(camera("+z"), large, whole);
+  // The pages of all bricks and a part of what they are drawn as: the first such size is looked for.
+  bool is_divided = false;
+  for (uint64_t bytes = whole.card_sent_bytes + 64 * whole.splats_drawn; !is_divided; bytes -= kMiB / 4) {
+    ASSERT_GT(bytes, whole.card_sent_bytes);
+    large.card_memory_bytes = bytes;
+    const Image image = card->render(camera("+z"), large, slabs);
+    ASSERT_EQ(slabs.card_splats, whole.card_splats) << bytes;
+    is_divided = slabs.card_slabs > 1;
+    EXPECT_EQ(image.rgba, wanted.rgba) << bytes;
+  }
+}
+
 TEST_F(FailingCard, KeepsFewerBricksWhereItRefusesMemory) {
   FrameStatistics statistics;
   const auto card = renderer();
@@ -424,6 +449,39 @@ TEST_F(FailingCard, LeavesItsPictureToQuadsOnceItWasReset) {
   EXPECT_NE(card->backendName().find("quads (the graphics card was reset while drawing)"), std::string::npos)
       << card->backendName();
   EXPECT_GE(compareImages(before, quads).psnr_db, 50);
+}
+
+/// Several ranks draw a picture, and the card of one of them fails in its midst: all draw it again, that one in another way.
+TEST_F(FailingCard, OfOneRankLeavesThePictureToTheOthersAndToQuads) {
+  FrameStatistics ignored;
+  const Image wanted = rendererBy(Backend::kCpu)->render(camera("iso"), options(0), ignored);
+  const std::pair<Faults, const char*> cases[] = {
+      {{.is_reset = true}, "quads (the graphics card was reset"},
+      {{.refusals = 100}, "quads (OpenGL has no memory left for"}};
+  for (const auto& [faults, expected] : cases)
+    for (const unsigned failing : {0u, 2u}) {
+      Image first, second;
+      std::string name;
+      runRanks(3, [&](Ranks& ranks) {
+        const bool fails = ranks.rank() == failing;
+        auto backend = fails ? std::make_unique<FailingBackend>() : makeBackend(Backend::kCpu);
+        FrameRenderer renderer(*cache_, DrawnScalars(0, TransferFunction::preset("viridis", -1, 1, 0.02)),
+                               std::move(backend));
+        if (fails) FailingBackend::faults = faults;
+        FrameOptions with = options(0);
+        with.ranks = &ranks;
+        FrameStatistics statistics;
+        Image a = renderer.render(camera("iso"), with, statistics),
+              b = renderer.render(camera("iso"), with, statistics);
+        if (fails) name = renderer.backendName();
+        if (!ranks.isFirst()) return;
+        first = std::move(a);
+        second = std::move(b);
+      });
+      EXPECT_GE(compareImages(first, wanted).psnr_db, 60) << expected;
+      EXPECT_EQ(first.rgba, second.rgba) << expected;
+      EXPECT_NE(name.find(expected), std::string::npos) << name;
+    }
 }
 
 TEST(Backends, GoOnWithQuadsAndThenByTheProcessor) {
@@ -490,6 +548,52 @@ TEST(CardMemory, IsTakenByWhatTheDriverTells) {
   EXPECT_EQ(defaultCardBytes(gl, 4 * 1024 * kMiB), 512 * kMiB);
   is_told = false;
   EXPECT_EQ(defaultCardBytes(gl, 0), 768 * kMiB);
+}
+
+/// 64 bricks, of which about four lie at any depth.
+std::vector<StoredPart> overlappingParts() {
+  Brick brick;
+  brick.splats = 1000;
+  brick.octant_splats = {1000};
+  std::vector<StoredPart> parts;
+  for (uint32_t n = 0; n < 64; ++n)
+    parts.push_back({n,
+                     brick.splats,
+                     brick.octant_splats,
+                     SplatRanges(brick, kAllOctants),
+                     glm::dvec3(0.0),
+                     {1000 * n, 1000 * n + 2600}});
+  return parts;
+}
+
+TEST(CardBricks, TakeFewSlabsNearTheLimitOfTheirMemory) {
+  const std::vector<StoredPart> parts = overlappingParts();
+  SplatGeometry geometry;
+  SplatVariable variable;
+  geometry.resize(1000);
+  variable.resize(1000);
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    if (const std::string why = context.functions().whyNoCompute(); !why.empty()) GTEST_SKIP() << why;
+    size_t divided = 0, most = 0;
+    for (uint64_t bytes = 9 * kMiB; bytes > kMiB; bytes -= 128 << 10) {
+      CardBricks bricks(context.functions(), UINT64_MAX);
+      CardBuffer splats(context.functions());
+      bricks.open(1, {});
+      const size_t fitting = bricks.makeRoom(parts, bytes, splats, 0);
+      const std::span<const StoredPart> stored = std::span(parts).first(fitting);
+      for (const StoredPart& part : stored) bricks.put(part, arraysOf(geometry), arraysOf(variable), {});
+      ASSERT_EQ(bricks.makeRoom(stored, bytes, splats, 0), fitting) << bytes;
+      const std::vector<CardSlab> slabs = bricks.beginFrame(stored);
+      for (const CardSlab& slab : slabs)
+        EXPECT_LE(slab.elements * sizeof(ScreenSplat), splats.bytes()) << bytes;
+      EXPECT_LE(splats.bytes() + 68'000 * fitting, bytes);
+      divided += fitting == parts.size() && slabs.size() > 1;
+      most = std::max(most, slabs.size());
+    }
+    EXPECT_GT(divided, 5u);
+    EXPECT_LE(most, 12u);
+  });
 }
 
 /// The pieces of `count` splats with this code.

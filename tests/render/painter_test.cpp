@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <random>
 #include <vector>
@@ -517,6 +518,36 @@ TEST(GlTilePainter, HidesOnlyWhatNothingShinesThroughTo) {
     EXPECT_GE(work.bytes, 16 * size.pixels());
     EXPECT_GT(work.paint_s, 0);
     EXPECT_DOUBLE_EQ(work.draw_s, work.list_s + work.sort_s + work.paint_s);
+  });
+}
+
+TEST(GlTilePainter, CountsWhatPixelsDo) {
+  const ImageSize size{48, 40};
+  const ScreenSplat splat{21.3f, 17.8f, 3.0f, -1.0f, 2.0f, 0.08f, 0.55f, 0.2f,
+                          -0.1f, 0.03f, 0,    0,     0,    0,     0,     0};
+  uint64_t inside = 0;
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      const double dx = x + 0.5 - 21.3f, dy = y + 0.5 - 17.8f;
+      const double u = dx / 3, v = (dy + u) / 2;
+      inside += u * u + v * v < kKernelSupport * kKernelSupport;
+    }
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    for (const bool counts : {false, true}) {
+      if (counts) setenv("CURVISPLAT_COUNT_PIXELS", "1", 1);
+      GlTilePainter painter(context);
+      unsetenv("CURVISPLAT_COUNT_PIXELS");
+      for (const uint64_t copies : {3, 1}) {
+        drawn(painter, std::vector<ScreenSplat>(copies, splat), lively(), size);
+        const CardWork work = painter.cardWork();
+        EXPECT_EQ(work.pixels_blended, counts ? copies * inside : 0);
+        // Each pixel of a tile of 16 looks at all splats of its list.
+        EXPECT_EQ(work.pixels_listed % (16 * 8), 0u);
+        EXPECT_LE(work.pixels_listed, 256 * work.entries);
+        EXPECT_GE(work.pixels_listed, work.pixels_blended);
+      }
+    }
   });
 }
 

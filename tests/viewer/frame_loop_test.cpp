@@ -9,6 +9,7 @@
 #include <iterator>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "stream/base/error.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/reference/reference_march.h"
+#include "tests/support/shared_egl.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_display.h"
 #include "tools/view/frame_loop.h"
@@ -103,6 +105,46 @@ TEST_F(FrameLoopTest, AMovingPictureIsOneAndCoarse) {
   EXPECT_FALSE(frames[0].is_final);
   EXPECT_LE(frames[0].statistics.splats_read, 100'000u);
   EXPECT_EQ(frames[0].image.size.width, 160);
+}
+
+/// A moving picture is shown where it was drawn. Nothing of it is read back before the picture is wanted.
+TEST_F(FrameLoopTest, PicturesStayOnTheCardOfAWindowThatSharesIt) {
+  std::optional<SharedEgl> window;
+  try {
+    window.emplace();
+  } catch (const Error& error) {
+    GTEST_SKIP() << error.what();
+  }
+  FrameLoop loop(cache_, Backend::kEgl, waker(), {}, &*window);
+  FrameRequest request = requestOf();
+  request.options.card_memory_bytes = 64 << 20;
+  request.may_stay_on_card = request.moving = true;
+  for (int n = 0; n < 5; ++n) {
+    request.camera.position.x += 0.01;
+    loop.request(request);
+    for (const ShownFrame& frame : all(loop)) {
+      if (loop.backendName().find("compute shaders") == std::string::npos) GTEST_SKIP() << loop.backendName();
+      EXPECT_TRUE(frame.on_card) << loop.backendName();
+      EXPECT_TRUE(frame.image.rgba.empty() && frame.bytes.empty());
+      EXPECT_EQ(frame.statistics.card_read_bytes, 0u);
+      EXPECT_GT(frame.statistics.card_peak_bytes, 0u);
+    }
+  }
+  request.moving = false;
+  loop.request(request);
+  const ShownFrame shown = std::move(all(loop).back());
+  EXPECT_TRUE(shown.is_final && shown.on_card);
+  request.may_stay_on_card = false;
+  request.only_final = true;
+  loop.request(request);
+  std::vector<ShownFrame> reads = all(loop);
+  ASSERT_EQ(reads.size(), 1u);
+  const ShownFrame read = std::move(reads.back());
+  EXPECT_FALSE(read.on_card);
+  EXPECT_GT(read.statistics.card_read_bytes, 0u);
+  const std::vector<uint8_t> seen = window->read(*shown.on_card);
+  ASSERT_EQ(seen.size(), read.bytes.size());
+  for (size_t n = 0; n < seen.size(); ++n) EXPECT_NEAR(seen[n], read.bytes[n], 1) << n;
 }
 
 TEST_F(FrameLoopTest, AMovingPicturesTimeDecidesItsSplatsAndPixels) {

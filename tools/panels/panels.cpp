@@ -483,7 +483,10 @@ void drawStatistics(const ViewState& state, const ShownStatistics& shown) {
     row("project, sort", fmt::format("{}, {}", milliseconds(s->project_s), milliseconds(s->sort_s)));
     row("upload, draw", fmt::format("{}, {}", milliseconds(s->upload_s), milliseconds(s->draw_s)));
     if (s->gl_draw_s > 0) row("OpenGL", milliseconds(s->gl_draw_s));
-    if (s->card_peak_bytes > 0) row("card memory", byteText(s->card_peak_bytes));
+    if (s->card_peak_bytes > 0) {
+      row("card memory", byteText(s->card_peak_bytes));
+      row("read back", byteText(s->card_read_bytes));
+    }
     row("splats", fmt::format("{} drawn of {}", count(s->splats_drawn), count(s->splats_read)));
     row("error", fmt::format("{:.2f} pixels", s->largest_error_px));
     row("bricks", fmt::format("{} resident", count(s->bricks_resident)));

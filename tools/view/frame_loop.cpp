@@ -102,11 +102,12 @@ void FrameLoop::Drawing::takeFaces(const CacheReader& cache, FrameRequest& reque
 }
 
 FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
-                     std::shared_future<void> after)
+                     std::shared_future<void> after, GlSharing* window)
     : cache_(cache.atStep(cache.step())),
       backend_(backend),
       wake_(std::move(wake)),
       after_(std::move(after)),
+      window_(window),
       thread_([this] { loop(); }) {}
 
 FrameLoop::~FrameLoop() {
@@ -249,7 +250,8 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
 
   Effort& effort = drawing.effort;
   double detail_px = request.moving ? effort.detailPixels() : 0;
-  for (uint64_t splats = effort.splats();; splats *= kRefinement) {
+  for (uint64_t splats = request.only_final ? CutOptions::kNoLimit : effort.splats();;
+       splats *= kRefinement) {
     ShownFrame frame;
     frame.request = number;
     frame.step = request.step;
@@ -259,7 +261,7 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
     frame.data = {cache_.manifest().lower, cache_.manifest().upper};
     frame.image = renderer.renderQuickly(request.camera, request.options,
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
-                                         frame.is_final);
+                                         frame.is_final, request.may_stay_on_card ? &frame.on_card : nullptr);
     const std::vector<BrickFailure>& damaged = frame.statistics.bricks_unreadable;
     if (!damaged.empty() && frame.statistics.splats_drawn == 0 && !request.options.scene) {
       if (frame.is_final) throw DamagedBrick(damaged.front().reason);
@@ -267,7 +269,7 @@ void FrameLoop::serve(Drawing& drawing, FrameRequest request, uint64_t number) {
       detail_px = 0;  // the picture is final in the end
       continue;       // finer bricks may be intact
     }
-    if (request.wants_bytes) frame.bytes = bytesOf(frame.image);
+    if (request.wants_bytes && !frame.on_card) frame.bytes = bytesOf(frame.image);
     // A view's first picture, at rest, teaches too: else the first movement of the mouse would wait for one
     // that takes too long.
     if (request.moving || !effort.hasLearned()) {
@@ -295,7 +297,7 @@ void FrameLoop::preparePlayer(Drawing& drawing, const FrameRequest& request) {
   if (!drawing.player || drawing.variables != variables || (scalars.colour && !same_function)) {
     drawing.player.reset();  // frees its memory before the next one allocates
     if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);
-    drawing.player = std::make_unique<StepPlayer>(cache_, scalars, backend_);
+    drawing.player = std::make_unique<StepPlayer>(cache_, scalars, backend_, window_);
     drawing.variables = variables;
   } else if (!same_function) {
     drawing.player->setTransferFunction(scalars.opacity.function);

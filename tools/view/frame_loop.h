@@ -71,6 +71,8 @@ struct FrameRequest {
   uint64_t step = 0;                      // time step
   double part = 0;                        // of the way to the next step: for values; faces stay at `step`
   bool wants_bytes = true;                // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
+  bool may_stay_on_card = false;          // ShownFrame::on_card instead of an image, if that can be
+  bool only_final = false;                // no coarser pictures come before it
   bool one_at_a_time = false;             // nothing is drawn until a picture has been given back
   std::optional<StepPosition> next = {};  // is likely to be wanted next, with this camera: read ahead
   FaceNames faces = {};                   // of options.scene's grid surfaces, which have their look only
@@ -84,6 +86,8 @@ std::vector<uint8_t> bytesOf(const Image& image);
 struct ShownFrame {
   Image image;
   std::vector<uint8_t> bytes;  // the image as 8-bit RGBA, clamped; empty unless the request wants it
+  std::shared_ptr<CardPicture>
+      on_card;  // not null: image and bytes are empty; it may have fewer pixels (ReducedSize)
   FrameStatistics statistics;
   uint64_t request = 0;  // what request() returned
   uint64_t step = 0;
@@ -133,9 +137,9 @@ class FrameLoop {
  public:
   /// Calls `wake` on the loop's thread whenever poll() has something to return. Opens the cache for itself,
   /// since it goes from step to step. If `after` is valid, nothing is drawn before it is ready: until then
-  /// another loop holds the memory.
+  /// another loop holds the memory. `window`: as makeBackend(); outlives the loop.
   FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
-            std::shared_future<void> after = {});
+            std::shared_future<void> after = {}, GlSharing* window = nullptr);
   /// Stops the picture being drawn.
   ~FrameLoop();
   FrameLoop(const FrameLoop&) = delete;
@@ -182,6 +186,7 @@ class FrameLoop {
   const Backend backend_;
   const std::function<void()> wake_;
   const std::shared_future<void> after_;
+  GlSharing* const window_;
 
   mutable Mutex mutex_;
   ConditionVariable changed_;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "render/frame/first_picture.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "tools/panels/time_bar.h"
@@ -87,7 +88,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       encodes_movies_(options.encodes_movies),
       probe_(cache_),
       chooser_(cache_, Window::wake) {
-  frames_.emplace(cache_, backend_, Window::wake, std::move(after));
+  startFrames(std::move(after));
   playback_.goTo(cache_.step());
   setBounds();
   if (!prepared.film) return;
@@ -117,6 +118,7 @@ void CacheView::takePictureOf(CacheView& before) {
   picture_.swap(before.picture_);
   overlay_.swap(before.overlay_);
   shown_strip_ = before.shown_strip_;
+  shown_width_ = before.shown_width_;
 }
 
 void CacheView::takeRequestsOf(CacheView& before) {
@@ -215,13 +217,21 @@ void CacheView::takeFrame() {
   }
   if (!frame) return;
   reports_.settle(About::kPicture);
-  if (frame->options.background.a < 1) {  // as frameOptions() has it for what lies behind the data
+  if (!frame->on_card &&
+      frame->options.background.a < 1) {  // as frameOptions() has it for what lies behind the data
     const ShownFunctions functions(state_, manifest());
     putBehind(frame->image, state_.annotations,
               sceneOf(state_, functions, *frame, frame->image.size, globe_grid_.boxOf(state_, cache_)));
     frame->bytes = bytesOf(frame->image);
   }
-  picture_.set(frame->bytes, frame->image.size);
+  shown_width_ = 1;
+  read_bytes_ += frame->statistics.card_read_bytes;
+  if (frame->on_card) {
+    picture_.show(frame->on_card);
+    shown_width_ = ReducedSize::shownWidth(frame->options.size, frame->on_card->size());
+  } else {
+    picture_.set(frame->bytes, frame->image.size);
+  }
   window_.redraw();
   shown_ = std::move(frame);
   annotate();
@@ -262,9 +272,18 @@ std::string CacheView::lacks() const {
   return fmt::format(", without {} damaged brick{}", number, number == 1 ? "" : "s");
 }
 
+/// Pictures of compute shaders are shown where they are drawn. Where the window is software's, no card draws as well as the
+/// window, and nothing is made for it unless EGL was asked for.
+void CacheView::startFrames(std::shared_future<void> after) {
+  const bool may_share = backend_ == Backend::kEgl || backend_ == Backend::kAutomatic;
+  const bool shares = backend_ == Backend::kEgl || !window_.isSoftware();
+  frames_.emplace(cache_, backend_, Window::wake, std::move(after),
+                  may_share ? &window_.sharing(shares) : nullptr);
+}
+
 /// The loop has ended with an error: what is asked now is tried by a new one, whose requests are counted anew.
 void CacheView::restartFrames() {
-  frames_.emplace(cache_, backend_, Window::wake);
+  startFrames();
   frames_failed_ = false;
   if (shown_) shown_->request = 0;
   values_asked_for_ = 0;
@@ -357,7 +376,7 @@ void CacheView::apply(const PanelActions& actions) {
   if (!actions.error.empty()) reports_.report(actions.error, About::kFunction);
 }
 
-void CacheView::ask(bool moving) {
+void CacheView::ask(bool moving, bool only_final) {
   was_moving_ = moving;
   changed_ = false;  // what cannot be drawn is not tried again before it changes
   rests_ = false;
@@ -365,11 +384,14 @@ void CacheView::ask(bool moving) {
   FrameRequest request{functions.scalars(cache_, state_), function_version_, state_.camera,
                        state_.frameOptions(data_size_)};
   request.moving = moving;
+  request.only_final = only_final;
   request.step = playback_.step();
   request.part = playback_.position().part;
   request.next = playback_.next();
   request.faces = state_.faceNames();
   request.faces_at = faces_at_;
+  // The processor saves pictures, and puts what lies behind the data there.
+  request.may_stay_on_card = !save_to_ && request.options.background.a >= 1;
   if (frames_failed_) restartFrames();
   // With a conversion beside the window, a picture can take more than twice as long as the one before it.
   request.target_s = (preview_ || adds_scalar_ ? 0.5 : 1.0) * target_s_;

@@ -149,6 +149,7 @@ class CacheView {
   std::optional<double> seriesTime() const;
   void giveUpSaving();
   void giveUpRequest();
+  void startFrames(std::shared_future<void> after = {});
   void restartFrames();
   /// The window's picture has this size, in pixels.
   void fitTo(ImageSize size);
@@ -158,7 +159,7 @@ class CacheView {
   void react(const WindowLayout& layout);
   PanelActions drawPanels(const WindowLayout& layout);
   void apply(const PanelActions& actions);
-  void ask(bool moving);
+  void ask(bool moving, bool only_final = false);
   void annotate();
   void showPicture(const WindowLayout& layout);
   void showPlanesAndMarkers(const WindowLayout& layout);
@@ -238,6 +239,8 @@ class CacheView {
   std::optional<ShownFrame> shown_;
   std::optional<std::array<glm::dvec2, 3>> axis_names_;  // where they stand in that picture, in pixels
   double shown_strip_ = 0;                               // part of the picture that the scalar bars take
+  uint64_t read_bytes_ = 0;                              // of OpenGL's pictures, all so far: for tests
+  double shown_width_ = 1;  // part of the texture's width that is shown, in its middle
   bool was_moving_ = false, dragging_ = false, rests_ = false;
   std::optional<std::filesystem::path> save_to_;  // once the picture is final; empty: the next number
   std::optional<MovieKind> copy_requested_;       // the command for one of these

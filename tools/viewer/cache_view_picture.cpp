@@ -47,12 +47,15 @@ void CacheView::showPicture(const WindowLayout& layout) {
   const Rectangle& place = layout.picture;
   const double right = place.x + place.width, bottom = place.y + place.height;
   nameArea("picture", place.x, place.y, place.width, place.height);
+  nameArea(fmt::format("read back {}", read_bytes_), place.x, place.y, place.width, place.height);
   const glm::vec4 paper = state_.background();
   list->AddRectFilled(toImGui(place.x, place.y), toImGui(right, bottom),
                       ImGui::ColorConvertFloat4ToU32({paper.x, paper.y, paper.z, 1}));
-  if (!picture_.isEmpty())
+  if (!picture_.isEmpty()) {
+    const double cut = 0.5 * (1 - shown_width_);
     list->AddImage(picture_.id(), toImGui(place.x, place.y),
-                   toImGui(right - shown_strip_ * place.width, bottom));
+                   toImGui(right - shown_strip_ * place.width, bottom), toImGui(cut, 0), toImGui(1 - cut, 1));
+  }
   if (!overlay_.isEmpty()) list->AddImage(overlay_.id(), toImGui(place.x, place.y), toImGui(right, bottom));
 }
 
@@ -221,8 +224,13 @@ void CacheView::saveTo(const fs::path& file) {
   changed_ |= frames_failed_;  // tries again
 }
 
+/// A picture that stays on the card is drawn again to be read: the same one.
 void CacheView::savePictureIfFinal() {
   if (!save_to_ || !isFinal()) return;
+  if (shown_->on_card) {
+    reports_.attempt([&] { ask(false, true); }, About::kPicture);
+    return;
+  }
   fs::path file = *std::exchange(save_to_, std::nullopt);
   const bool numbered = file.empty();
   for (int number = 1; file.empty() || (numbered && fs::exists(file)); ++number)

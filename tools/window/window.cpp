@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
@@ -24,7 +25,7 @@ namespace {
 constexpr double kLongestWaitSeconds = 0.1;  // for a picture that is near
 constexpr double kClickReach = 4;            // a button that moves further than this drags
 
-std::string last_glfw_error;  // main thread only
+thread_local std::string last_glfw_error;  // of this thread's calls
 
 void onError(int, const char* description) {
   last_glfw_error = description ? description : "";
@@ -46,14 +47,21 @@ struct Window::Library {
 
 namespace {
 
-/// Opens a window with OpenGL 3.3 or newer and makes its context current. Throws Error.
-GLFWwindow* openWindow(const char* title, ImageSize size, bool visible) {
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+/// Makes a window with a core context of OpenGL `major`.3 or newer, which shares textures with that of `shared`, if there is
+/// one. Null, and last_glfw_error says why, if there is none.
+GLFWwindow* makeWindow(const char* title, ImageSize size, bool visible, int major,
+                       GLFWwindow* shared = nullptr) {
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, major);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
   glfwWindowHint(GLFW_VISIBLE, visible ? GLFW_TRUE : GLFW_FALSE);
-  GLFWwindow* const window = glfwCreateWindow(size.width, size.height, title, nullptr, nullptr);
+  return glfwCreateWindow(size.width, size.height, title, nullptr, shared);
+}
+
+/// Opens a window with OpenGL 3.3 or newer and makes its context current. Throws Error.
+GLFWwindow* openWindow(const char* title, ImageSize size, bool visible) {
+  GLFWwindow* const window = makeWindow(title, size, visible, 3);
   if (!window)
     throw Error(
         "cannot open a window: {}; it needs OpenGL 3.3 (from a graphics driver or Mesa's libgl1-mesa-dri)",
@@ -66,9 +74,12 @@ GlFunctions glOfCurrentContext() {
   return GlFunctions([](const char* name) { return reinterpret_cast<void*>(glfwGetProcAddress(name)); });
 }
 
+std::string textOf(const GlFunctions& gl, GLenum name) {
+  return reinterpret_cast<const char*>(gl.GetString(name));
+}
+
 std::string nameOf(const GlFunctions& gl) {
-  return fmt::format("{}, {}", reinterpret_cast<const char*>(gl.GetString(GL_VERSION)),
-                     reinterpret_cast<const char*>(gl.GetString(GL_RENDERER)));
+  return fmt::format("{}, {}", textOf(gl, GL_VERSION), textOf(gl, GL_RENDERER));
 }
 
 std::string displayName() {
@@ -82,6 +93,65 @@ std::string displayName() {
 }
 
 }  // namespace
+
+/// The context of a hidden window, which shares textures with the window's. GLFW makes and removes both on the main thread; a
+/// painter's thread borrows the context.
+class SharedContext final : public GlSharing {
+ public:
+  explicit SharedContext(std::string renderer) : renderer_(std::move(renderer)) {}
+  ~SharedContext() override {
+    if (hidden_) glfwDestroyWindow(hidden_);
+  }
+  SharedContext(const SharedContext&) = delete;
+  SharedContext& operator=(const SharedContext&) = delete;
+
+  /// Makes the hidden window, once. On the main thread, before makeContext().
+  void prepare(GLFWwindow* window) {
+    if (std::exchange(is_prepared_, true)) return;
+    hidden_ = makeWindow("", {1, 1}, false, 4, window);
+    if (!hidden_) why_none_ = last_glfw_error;
+  }
+  const std::string& renderer() const override { return renderer_; }
+  std::unique_ptr<GlContext> makeContext() override {
+    if (!hidden_) throw Error("no second context for the window: {}", why_none_);
+    if (is_lent_.exchange(true)) throw Error("the window's second context is in use");
+    auto lent = std::make_unique<Lent>(*this);
+    return std::make_unique<Context>(std::move(lent), bin_);
+  }
+
+ private:
+  /// The context while it is current on a painter's thread.
+  struct Lent {
+    explicit Lent(SharedContext& of) : owner(of) { glfwMakeContextCurrent(owner.hidden_); }
+    ~Lent() {
+      glfwMakeContextCurrent(nullptr);
+      owner.is_lent_ = false;
+    }
+    Lent(const Lent&) = delete;
+    Lent& operator=(const Lent&) = delete;
+    SharedContext& owner;
+  };
+  struct HasLent {
+    std::unique_ptr<Lent> lent;
+  };
+  // The first base gives the context back after the second one has ended.
+  class Context final : private HasLent, public GlContext {
+   public:
+    Context(std::unique_ptr<Lent> lent, std::shared_ptr<SharedBin> bin)
+        : HasLent{std::move(lent)},
+          GlContext(
+              "the window's",
+              [](const char* name) { return reinterpret_cast<void*>(glfwGetProcAddress(name)); },
+              std::move(bin)) {}
+  };
+
+  const std::string renderer_;
+  bool is_prepared_ = false;
+  GLFWwindow* hidden_ = nullptr;
+  std::string why_none_;
+  std::atomic<bool> is_lent_ = false;
+  const std::shared_ptr<SharedBin> bin_ = std::make_shared<SharedBin>();
+};
 
 WindowReport examineWindow() {
   WindowReport report;
@@ -104,6 +174,7 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   glfwSwapInterval(1);
   gl_ = std::make_unique<GlFunctions>(glOfCurrentContext());
   context_name_ = nameOf(*gl_);
+  shared_ = std::make_unique<SharedContext>(textOf(*gl_, GL_RENDERER));
   glfwSetWindowUserPointer(window_, this);
   // Dear ImGui installs its callbacks later and calls these from them.
   glfwSetKeyCallback(window_, onKey);
@@ -168,7 +239,17 @@ Window::~Window() {
   ImGui_ImplOpenGL3_Shutdown();
   ImGui_ImplGlfw_Shutdown();
   ImGui::DestroyContext();
+  shared_.reset();
   glfwDestroyWindow(window_);
+}
+
+GlSharing& Window::sharing(bool wants_context) {
+  if (wants_context) shared_->prepare(window_);
+  return *shared_;
+}
+
+bool Window::isSoftware() const {
+  return isSoftwareRenderer(shared_->renderer());
 }
 
 bool Window::isOpen() const {
@@ -424,6 +505,7 @@ PictureTexture::PictureTexture(const GlFunctions& gl) : gl_(gl) {
 void PictureTexture::release() {
   if (texture_ != 0) gl_.DeleteTextures(1, &texture_);
   texture_ = 0;
+  on_card_.reset();
   size_ = {0, 0};
 }
 
@@ -434,6 +516,14 @@ void PictureTexture::set(std::span<const uint8_t> rgba, ImageSize size) {
                  rgba.data());
   gl_.check("showing a picture");
   size_ = size;
+  on_card_.reset();
+}
+
+void PictureTexture::show(std::shared_ptr<const CardPicture> picture) {
+  picture->waitFor(gl_);
+  gl_.check("waiting for a picture");
+  size_ = picture->size();
+  on_card_ = std::move(picture);
 }
 
 }  // namespace curvisplat

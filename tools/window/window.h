@@ -18,12 +18,16 @@
 #include <vector>
 
 #include "render/camera/camera.h"
+#include "render/gl/card_picture.h"
+#include "render/gl/gl_context.h"
 #include "render/gl/gl_functions.h"
 #include "render/image/image.h"
 
 struct GLFWwindow;
 
 namespace curvisplat {
+
+class SharedContext;
 
 /// A rectangle in Dear ImGui units, from the upper left corner.
 struct Rectangle {
@@ -131,6 +135,11 @@ class Window {
 
   void setClipboard(const std::string& text);
   const GlFunctions& gl() const { return *gl_; }
+  /// Another context, for a painter whose pictures are shown without a copy. It is made now, if it is wanted; what refuses it
+  /// is what makeContext() throws.
+  GlSharing& sharing(bool wants_context);
+  /// Whether the processor draws the window.
+  bool isSoftware() const;
   /// "4.5 (Core Profile) Mesa 22.3.6, llvmpipe ..."
   const std::string& contextName() const { return context_name_; }
 
@@ -157,6 +166,7 @@ class Window {
   std::unique_ptr<Library> library_;
   GLFWwindow* window_ = nullptr;
   std::unique_ptr<GlFunctions> gl_;
+  std::unique_ptr<SharedContext> shared_;
   std::string context_name_;
   // The size as of GLFW's last callback: querying would wait for the display, which may still be showing a
   // frame.
@@ -208,8 +218,8 @@ class Window {
   double wheel_ = 0;
 };
 
-/// An OpenGL texture, 8 bits per channel, that shows a picture in the window. Use it on the context's
-/// thread; destroy or release() it before the context. Interpolates linearly when stretched.
+/// An OpenGL texture, 8 bits per channel, that shows a picture in the window: its own, or that of a picture that stays on
+/// the card. Use it on the context's thread; destroy or release() it before the context. Interpolates linearly when stretched.
 class PictureTexture {
  public:
   explicit PictureTexture(const GlFunctions& gl);
@@ -221,21 +231,27 @@ class PictureTexture {
 
   /// Uploads a picture: red, green, blue, alpha per pixel, not premultiplied; rows from the top.
   void set(std::span<const uint8_t> rgba, ImageSize size);
+  /// Shows the texture of a picture that was drawn in a context of Window::sharing().
+  void show(std::shared_ptr<const CardPicture> picture);
 
   /// Both are of one context.
   void swap(PictureTexture& other) {
     std::swap(texture_, other.texture_);
     std::swap(size_, other.size_);
+    on_card_.swap(other.on_card_);
   }
   bool isEmpty() const { return size_.width == 0; }
   ImageSize size() const { return size_; }
   /// Texture identifier for Dear ImGui.
-  void* id() const { return reinterpret_cast<void*>(static_cast<uintptr_t>(texture_)); }
+  void* id() const {
+    return reinterpret_cast<void*>(static_cast<uintptr_t>(on_card_ ? on_card_->texture() : texture_));
+  }
 
  private:
   const GlFunctions& gl_;
   GLuint texture_ = 0;
   ImageSize size_{0, 0};
+  std::shared_ptr<const CardPicture> on_card_;  // null: the texture is shown
 };
 
 }  // namespace curvisplat
