@@ -111,6 +111,14 @@ Camera magnified(const Camera& camera, double factor) {
   return nearer;
 }
 
+Camera rescaled(const Camera& camera, const glm::dvec3& from, const glm::dvec3& to) {
+  Camera moved = camera;
+  const glm::dvec3 way = camera.focal_point * (to / from - 1.0);
+  moved.focal_point += way;
+  moved.position += way;
+  return moved;
+}
+
 CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
     : key_frames_(std::move(key_frames)), name_(std::move(name)) {
   if (key_frames_.empty()) throw Error("{}: a camera path needs at least one key frame, found none", name_);

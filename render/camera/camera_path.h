@@ -30,6 +30,9 @@ Camera rolled(const Camera& camera, double degrees);
 /// or the view angle, is divided by it.
 Camera magnified(const Camera& camera, double factor);
 
+/// `camera` moved as the data's scale changes: the same place of the data stays in focus, seen from as far.
+Camera rescaled(const Camera& camera, const glm::dvec3& from, const glm::dvec3& to);
+
 /// A direction on the great circle between two, as a unit vector; `from` itself if they are the same. `around`: the axis that
 /// opposite ones turn about, as far as it is across them.
 glm::dvec3 directionBetween(const glm::dvec3& from, const glm::dvec3& to, const glm::dvec3& around,
@@ -64,6 +67,7 @@ class CameraPath {
   double begin() const { return key_frames_.front().time; }
   double end() const { return key_frames_.back().time; }
   const std::vector<KeyFrame>& keyFrames() const { return key_frames_; }
+  const std::string& name() const { return name_; }
   /// `time` is clamped to [begin(), end()]. Throws Error if the camera coincides with its focal point then.
   Camera at(double time) const;
 

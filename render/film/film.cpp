@@ -125,6 +125,14 @@ void takeFunction(const JsonField& field, const std::string& place, KeyLook& loo
   }
 }
 
+glm::dvec3 scaleFrom(const JsonField& field) {
+  constexpr double kMin = 1e-6, kMax = 1e6;  // as of the option
+  const glm::dvec3 scale = field.point(kMax);
+  if (!(scale.x >= kMin && scale.y >= kMin && scale.z >= kMin))
+    field.fail("three numbers between 1e-6 and 1e6");
+  return scale;
+}
+
 KeyLook lookFrom(const JsonField& fields, const std::string& place) {
   KeyLook look;
   if (const auto function = fields.find("function")) takeFunction(*function, place + ".function", look);
@@ -146,8 +154,9 @@ void KeyLook::setFunction(const FunctionParts& from) {
   parts = from;
 }
 
-Film::Film(CameraPath cameras, std::vector<KeyLook> looks, std::string scalar, const std::string& name)
-    : cameras_(std::move(cameras)), looks_(std::move(looks)), scalar_(std::move(scalar)) {
+Film::Film(CameraPath cameras, std::vector<KeyLook> looks, std::string scalar, const std::string& name,
+           std::optional<glm::dvec3> scale)
+    : cameras_(std::move(cameras)), looks_(std::move(looks)), scalar_(std::move(scalar)), scale_(scale) {
   CURVISPLAT_CHECK_OP(looks_.size(), ==, cameras_.keyFrames().size());
   for (size_t n = 0; n < looks_.size(); ++n) {
     const auto &first = looks_[0].function, &function = looks_[n].function;
@@ -169,6 +178,16 @@ Film::Film(CameraPath cameras, std::vector<KeyLook> looks, std::string scalar, c
     if (stated_.clip_planes && !look.clip_planes) look.clip_planes.emplace();
     if (stated_.slices && !look.slices) look.slices.emplace();
   }
+}
+
+Film Film::inScale(const glm::dvec3& scale) const {
+  Film moved = *this;
+  if (!scale_ || *scale_ == scale) return moved;
+  std::vector<KeyFrame> keys = cameras_.keyFrames();
+  for (KeyFrame& key : keys) key.camera = rescaled(key.camera, *scale_, scale);
+  moved.cameras_ = CameraPath(std::move(keys), cameras_.name());
+  moved.scale_ = scale;
+  return moved;
 }
 
 double Film::timeOf(uint64_t frame, uint64_t frames) const {
@@ -194,8 +213,9 @@ Film Film::fromFile(const std::filesystem::path& path) {
   std::vector<KeyLook> looks;
   for (const JsonField& key : root.at("key_frames").elements())
     looks.push_back(lookFrom(key, fmt::format("{}: key_frames[{}]", path.string(), looks.size())));
-  const auto scalar = root.find("scalar");
-  return Film(std::move(cameras), std::move(looks), scalar ? scalar->text() : "", path.string());
+  const auto scalar = root.find("scalar"), scale = root.find("scale");
+  return Film(std::move(cameras), std::move(looks), scalar ? scalar->text() : "", path.string(),
+              scale ? std::optional(scaleFrom(*scale)) : std::nullopt);
 }
 
 std::string Film::toJson() const {
@@ -222,8 +242,9 @@ std::string Film::toJson() const {
     if (look.slices) key["slices"] = jsonOf(*look.slices);
     keys.push_back(key.dump());
   }
-  const std::string scalar = scalar_.empty() ? "" : fmt::format("\"scalar\": {}, ", Json(scalar_).dump());
-  return fmt::format("{{{}\"key_frames\": [\n{}]}}\n", scalar, fmt::join(keys, ",\n"));
+  std::string stated = scalar_.empty() ? "" : fmt::format("\"scalar\": {}, ", Json(scalar_).dump());
+  if (scale_) stated += fmt::format("\"scale\": {}, ", point(*scale_).dump());
+  return fmt::format("{{{}\"key_frames\": [\n{}]}}\n", stated, fmt::join(keys, ",\n"));
 }
 
 }  // namespace curvisplat

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,8 +37,10 @@ class Film {
   };
 
   /// `looks`: of each key frame. All of them have functions, or none; planes and boxes that one lacks and another has are
-  /// none. `scalar`: that the functions are of; empty: not stated. Throws Error that names the key frame.
-  Film(CameraPath cameras, std::vector<KeyLook> looks, std::string scalar, const std::string& name);
+  /// none. `scalar`: that the functions are of; empty: not stated. `scale`: the data's scale (FrameOptions::scale) of the pictures
+  /// that the cameras are for; none: of any. Throws Error that names the key frame.
+  Film(CameraPath cameras, std::vector<KeyLook> looks, std::string scalar, const std::string& name,
+       std::optional<glm::dvec3> scale = std::nullopt);
   /// Reads the JSON file that tools/REFERENCE.md describes. Throws Error with the file, the key frame and the field.
   static Film fromFile(const std::filesystem::path& path);
   std::string toJson() const;
@@ -45,7 +48,10 @@ class Film {
   const CameraPath& cameras() const { return cameras_; }
   const std::vector<KeyLook>& looks() const { return looks_; }
   const std::string& scalar() const { return scalar_; }
+  const std::optional<glm::dvec3>& scale() const { return scale_; }
   const Stated& stated() const { return stated_; }
+  /// The film for pictures of another scale: each camera keeps the place of the data that it looks at. Itself, if it is for any.
+  Film inScale(const glm::dvec3& scale) const;
   /// Whether any key frame has another function than the one before.
   bool functionsChange() const { return functions_change_; }
 
@@ -60,6 +66,7 @@ class Film {
   CameraPath cameras_;
   std::vector<KeyLook> looks_;
   std::string scalar_;
+  std::optional<glm::dvec3> scale_;
   Stated stated_;
   bool functions_change_ = false;
 };

@@ -318,6 +318,13 @@ std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, co
   return channels;
 }
 
+ImageSize sizeOfExr(std::span<const std::byte> bytes, const std::string& name) {
+  Cursor cursor(bytes, name);
+  const ExrLayout layout = takeHeader(cursor, name);
+  requirePossibleSize(layout.width(), layout.height(), name);
+  return {static_cast<int>(layout.width()), static_cast<int>(layout.height())};
+}
+
 Image decodeExr(std::span<const std::byte> bytes, const std::string& name) {
   const ExrLayout layout = checkFile(bytes, name);
   const std::span memory = memoryOf(bytes);

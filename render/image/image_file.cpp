@@ -24,16 +24,18 @@ struct Format {
   Bytes (*encode)(const Image&);
   uint64_t pixel_bytes;  // of memory that encoding needs for each pixel, the encoded file included
   Image (*decode)(std::span<const std::byte>, const std::string&);
+  ImageSize (*size)(std::span<const std::byte>, const std::string&);
 };
 
-constexpr std::array<Format, 4> kFormats{{
-    {".png", "\x89PNG", encodePng, 8, decodePng},
-    {".exr", "\x76\x2f\x31\x01", encodeExr, 48, decodeExr},
-    {".pfm", "PF", encodePfm, 12, decodePfm},
-    {"", "Pf", nullptr, 0, decodePfm},  // greyscale: read, never written
+constexpr std::array<Format, 5> kFormats{{
+    {".png", "\x89PNG", encodePng, 8, decodePng, sizeOfPng},
+    {".exr", "\x76\x2f\x31\x01", encodeExr, 48, decodeExr, sizeOfExr},
+    {".pfm", "PF", encodePfm, 12, decodePfm, sizeOfPfm},
+    {"", "Pf", nullptr, 0, decodePfm, sizeOfPfm},  // greyscale: read, never written
+    {"", "\xff\xd8\xff", nullptr, 0, decodeJpeg, sizeOfJpeg},
 }};
 
-constexpr size_t kLongestMagic = 4;
+constexpr size_t kLongestHeader = size_t{4} << 20;    // profiles and small pictures may come first
 constexpr uint64_t kLargestFile = uint64_t{8} << 30;  // 16384 x 16384 pixels of four floats are 4 GiB
 
 /// nullptr: none has this ending.
@@ -82,11 +84,19 @@ void writeExr(const Image& image, std::span<const ImageChannel> more, const std:
   writeFileDurably(path, encodeExr(image, more));
 }
 
-std::vector<ImageChannel> readChannels(const std::filesystem::path& path) {
-  const InputFile file(path);
+namespace {
+
+void requireReadable(const InputFile& file, const std::filesystem::path& path) {
   if (file.size() > kLargestFile)
     throw Error("{}: has {} bytes; image files of at most {} bytes are read", path.string(), file.size(),
                 kLargestFile);
+}
+
+}  // namespace
+
+std::vector<ImageChannel> readChannels(const std::filesystem::path& path) {
+  const InputFile file(path);
+  requireReadable(file, path);
   Bytes bytes(file.size());
   file.readAt(0, std::span(bytes));
   return decodeExrChannels(bytes, path.string());
@@ -100,29 +110,48 @@ void checkImageName(const std::filesystem::path& path) {
   formatByName(path);
 }
 
-Image readImage(const std::filesystem::path& path) {
-  const InputFile file(path);
-  Bytes bytes(std::min<uint64_t>(file.size(), kLongestMagic));
+namespace {
+
+const Format& formatOf(std::span<const std::byte> bytes, const std::filesystem::path& path) {
+  for (const Format& format : kFormats)
+    if (bytes.size() >= format.magic.size() &&
+        std::memcmp(bytes.data(), format.magic.data(), format.magic.size()) == 0)
+      return format;
+  throw Error("{}: not a PNG, JPEG, EXR or PFM image (by its first bytes)", path.string());
+}
+
+Bytes firstBytes(const InputFile& file, uint64_t most) {
+  Bytes bytes(std::min<uint64_t>(file.size(), most));
   file.readAt(0, std::span(bytes));
-  for (const Format& format : kFormats) {
-    if (bytes.size() < format.magic.size() ||
-        std::memcmp(bytes.data(), format.magic.data(), format.magic.size()) != 0)
-      continue;
-    if (file.size() > kLargestFile)
-      throw Error("{}: has {} bytes; image files of at most {} bytes are read", path.string(), file.size(),
-                  kLargestFile);
-    bytes.resize(file.size());
-    file.readAt(0, std::span(bytes));
-    return format.decode(bytes, path.string());
-  }
-  throw Error("{}: not a PNG, EXR or PFM image (by its first bytes)", path.string());
+  return bytes;
+}
+
+}  // namespace
+
+ImageSize readImageSize(const std::filesystem::path& path) {
+  const Bytes bytes = firstBytes(InputFile(path), kLongestHeader);
+  const ImageSize size = formatOf(bytes, path).size(bytes, path.string());
+  requirePossibleSize(size.width, size.height, path.string());
+  return size;
+}
+
+Image readImage(const std::filesystem::path& path) {
+  constexpr size_t kLongestMagic = 4;
+  const InputFile file(path);
+  const Format& format = formatOf(firstBytes(file, kLongestMagic), path);
+  requireReadable(file, path);
+  return format.decode(firstBytes(file, file.size()), path.string());
+}
+
+void requirePossibleSize(int64_t width, int64_t height, const std::string& name) {
+  if (width < 1 || height < 1 || width > kLargestImageSide || height > kLargestImageSide)
+    throw Error("{}: claims {} x {} pixels, expected 1 to {} on each side", name, width, height,
+                kLargestImageSide);
 }
 
 void requirePlausibleSize(int64_t width, int64_t height, uint64_t bytes_per_pixel, uint64_t packed_bytes,
                           uint64_t largest_ratio, const std::string& name) {
-  if (width < 1 || height < 1 || width > kLargestImageSide || height > kLargestImageSide)
-    throw Error("{}: claims {} x {} pixels, expected 1 to {} on each side", name, width, height,
-                kLargestImageSide);
+  requirePossibleSize(width, height, name);
   const uint64_t image_bytes = static_cast<uint64_t>(width) * static_cast<uint64_t>(height) * bytes_per_pixel;
   if (image_bytes / largest_ratio > packed_bytes)
     throw Error("{}: claims {} x {} pixels, which its {} bytes cannot hold; the file is truncated or corrupt",
@@ -200,7 +229,15 @@ Bytes encodePfm(const Image& image) {
   return bytes;
 }
 
-Image decodePfm(std::span<const std::byte> bytes, const std::string& name) {
+namespace {
+
+struct PfmHeader {
+  int channels, width, height;
+  double scale;
+  size_t bytes;
+};
+
+PfmHeader headerOfPfm(std::span<const std::byte> bytes, const std::string& name) {
   const size_t longest_header = std::min<size_t>(bytes.size(), 256);
   HeaderWords words({reinterpret_cast<const char*>(bytes.data()), longest_header}, name);
   const int channels = words.next() == "PF" ? 3 : 1;
@@ -208,8 +245,19 @@ Image decodePfm(std::span<const std::byte> bytes, const std::string& name) {
   const auto scale = words.nextNumber<double>("scale");
   if (!std::isfinite(scale) || scale == 0)
     throw Error("{}: the PFM header has the scale {}; expected a finite number other than 0", name, scale);
+  return {channels, width, height, scale, words.at()};
+}
 
-  const uint64_t found = bytes.size() - words.at();
+}  // namespace
+
+ImageSize sizeOfPfm(std::span<const std::byte> bytes, const std::string& name) {
+  const PfmHeader header = headerOfPfm(bytes, name);
+  return {header.width, header.height};
+}
+
+Image decodePfm(std::span<const std::byte> bytes, const std::string& name) {
+  const auto [channels, width, height, scale, header_bytes] = headerOfPfm(bytes, name);
+  const uint64_t found = bytes.size() - header_bytes;
   requirePlausibleSize(width, height, 4 * channels, found, 1, name);
   const uint64_t expected = 4ull * channels * width * height;
   if (found != expected)
@@ -217,7 +265,7 @@ Image decodePfm(std::span<const std::byte> bytes, const std::string& name) {
                 height, channels, expected, found);
 
   Image image({width, height});
-  const std::byte* from = bytes.data() + words.at();
+  const std::byte* from = bytes.data() + header_bytes;
   for (int y = height - 1; y >= 0; --y)
     for (int x = 0; x < width; ++x) {
       float* pixel = image.pixel(x, y);

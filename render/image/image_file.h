@@ -1,4 +1,4 @@
-// Reads and writes image files, and encodes and decodes each format in memory: PNG, EXR and PFM.
+// Reads and writes image files, and encodes and decodes each format in memory: PNG, EXR and PFM; JPEG is only read.
 //
 // A file that is written appears whole or not at all. Decoders take untrusted bytes: every size is compared
 // with the number of bytes given before anything is allocated. They throw Error with a message that begins
@@ -35,8 +35,11 @@ void checkImageName(const std::filesystem::path& path);
 void checkImageSize(uint64_t width, uint64_t height, const std::filesystem::path& path);
 /// Memory that writeImage() needs for an image of `size`, beside the image itself.
 uint64_t writingBytes(const std::filesystem::path& path, ImageSize size);
-/// Reads PNG (8 and 16 bits a channel), scan-line EXR and PFM files. Throws Error.
+/// Reads PNG (8 and 16 bits a channel), JPEG, scan-line EXR and PFM files. Throws Error.
 Image readImage(const std::filesystem::path& path);
+/// The size that the file's header states, which nothing else in it need bear out. Reads no more than the header. Throws Error as
+/// readImage().
+ImageSize readImageSize(const std::filesystem::path& path);
 
 /// An encoded image: all bytes of its file.
 using Bytes = std::vector<std::byte>;
@@ -58,9 +61,17 @@ Image decodeExr(std::span<const std::byte> bytes, const std::string& name);
 /// Decodes the channels that are not colours.
 std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, const std::string& name);
 Image decodePfm(std::span<const std::byte> bytes, const std::string& name);
+Image decodeJpeg(std::span<const std::byte> bytes, const std::string& name);
+/// The size by the header alone; `bytes` may end behind it.
+ImageSize sizeOfPng(std::span<const std::byte> bytes, const std::string& name);
+ImageSize sizeOfExr(std::span<const std::byte> bytes, const std::string& name);
+ImageSize sizeOfPfm(std::span<const std::byte> bytes, const std::string& name);
+ImageSize sizeOfJpeg(std::span<const std::byte> bytes, const std::string& name);
 
-/// Throws Error unless width and height are in [1, kLargestImageSide] and `packed_bytes` can hold that many
-/// pixels of `bytes_per_pixel`, compressed by at most `largest_ratio`.
+/// Throws Error unless width and height are in [1, kLargestImageSide].
+void requirePossibleSize(int64_t width, int64_t height, const std::string& name);
+/// Throws Error as requirePossibleSize(), and unless `packed_bytes` can hold that many pixels of `bytes_per_pixel`, compressed by
+/// at most `largest_ratio`.
 void requirePlausibleSize(int64_t width, int64_t height, uint64_t bytes_per_pixel, uint64_t packed_bytes,
                           uint64_t largest_ratio, const std::string& name);
 

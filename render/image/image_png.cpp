@@ -150,6 +150,20 @@ Bytes encodePng(const Image& image, PngEffort effort) {
   return bytes;
 }
 
+/// Does without libpng, which would first complain of a header whose checksum is wrong, too.
+ImageSize sizeOfPng(std::span<const std::byte> bytes, const std::string& name) {
+  constexpr size_t kHeader = 24;  // 8 bytes of signature, of length and name, and of the size, big-endian
+  if (bytes.size() < kHeader) throw Error("{}: the PNG header is truncated", name);
+  const auto number = [&](size_t at) {
+    int64_t value = 0;
+    for (size_t n = 0; n < 4; ++n) value = 256 * value + std::to_integer<int64_t>(bytes[at + n]);
+    return value;
+  };
+  const int64_t width = number(16), height = number(20);
+  requirePossibleSize(width, height, name);
+  return {static_cast<int>(width), static_cast<int>(height)};
+}
+
 Image decodePng(std::span<const std::byte> bytes, const std::string& name) {
   PngReader reader(bytes);
   if (!readHeader(reader)) throw Error("{}: the PNG header cannot be read: {}", name, reader.message.text);

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -52,7 +53,28 @@ CurveSet pointsOf(CurveSet set) {
 
 namespace {
 
-/// Appends points of a set with times to another one of the same origin.
+/// The way from one place to another around the middle of a sphere.
+struct SphereArc {
+  glm::dvec3 from, across;  // directions; across: at right angles to the first, towards the other one
+  double angle, radius_from, radius_to;
+
+  SphereArc(const glm::dvec3& a, const glm::dvec3& b)
+      : from(glm::normalize(a)), radius_from(glm::length(a)), radius_to(glm::length(b)) {
+    const glm::dvec3 to = glm::normalize(b), normal = glm::cross(from, to);
+    angle = std::atan2(glm::length(normal), glm::dot(from, to));
+    // Opposite places are joined by a pole, or, if they are the poles, by longitude 0.
+    constexpr double kOpposite = 1e-9, kPole = 1 - 1e-12;
+    const glm::dvec3 by = std::abs(from.z) < kPole ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
+    const glm::dvec3 towards = glm::length(normal) < kOpposite ? by : to;
+    across = glm::normalize(towards - glm::dot(towards, from) * from);
+  }
+  glm::dvec3 at(double part) const {
+    return std::lerp(radius_from, radius_to, part) *
+           (std::cos(part * angle) * from + std::sin(part * angle) * across);
+  }
+};
+
+/// Appends points of a set to another one of the same origin.
 class PartOfSet {
  public:
   explicit PartOfSet(const CurveSet& whole) : whole_(whole) {
@@ -65,10 +87,11 @@ class PartOfSet {
   void addBetween(size_t point, size_t next, double part) {
     const auto mixed = static_cast<float>(part);
     part_.positions.push_back(glm::mix(whole_.positions[point], whole_.positions[next], mixed));
-    part_.times.push_back(whole_.times[point] + part * (whole_.times[next] - whole_.times[point]));
-    if (whole_.values.empty()) return;
-    const float from = whole_.values[point], to = whole_.values[next];
-    part_.values.push_back(part == 0 ? from : from + mixed * (to - from));
+    addValues(point, next, part);
+  }
+  void addOn(const SphereArc& arc, size_t point, size_t next, double part) {
+    part_.positions.emplace_back(arc.at(part) - whole_.origin);
+    addValues(point, next, part);
   }
   /// The place between the point before `next` and it at a time; nothing where they are one.
   void addAt(double time, size_t next) {
@@ -82,11 +105,56 @@ class PartOfSet {
   CurveSet finish() { return std::move(part_); }
 
  private:
+  void addValues(size_t point, size_t next, double part) {
+    if (!whole_.times.empty())
+      part_.times.push_back(whole_.times[point] + part * (whole_.times[next] - whole_.times[point]));
+    if (whole_.values.empty()) return;
+    const float from = whole_.values[point], to = whole_.values[next];
+    part_.values.push_back(part == 0 ? from : from + static_cast<float>(part) * (to - from));
+  }
+
   const CurveSet& whole_;
   CurveSet part_;
 };
 
 }  // namespace
+
+CurveSet alongSphere(const CurveSet& set) {
+  constexpr double kMaxSagitta = 2e-5;
+  double widest = 2 * std::acos(1 - kMaxSagitta);
+  const auto arcTo = [&](size_t next) {
+    return SphereArc(set.origin + glm::dvec3(set.positions[next - 1]),
+                     set.origin + glm::dvec3(set.positions[next]));
+  };
+  const auto piecesOf = [&](const SphereArc& arc) {
+    uint64_t pieces = 1;
+    while (arc.angle > widest * static_cast<double>(pieces)) pieces *= 2;
+    return pieces;
+  };
+  const auto added = [&] {
+    uint64_t count = 0;
+    for (size_t line = 0; line < set.lines(); ++line)
+      for (size_t next = size_t{set.begins[line]} + 1; next < set.begins[line + 1]; ++next)
+        count += piecesOf(arcTo(next)) - 1;
+    return count;
+  };
+  const uint64_t points = set.positions.size(), room = std::numeric_limits<uint32_t>::max() - 1 - points;
+  while (added() > std::min(4 * points + (uint64_t{1} << 20), room)) widest *= 2;
+  PartOfSet whole(set);
+  for (size_t line = 0; line < set.lines(); ++line) {
+    for (size_t n = set.begins[line]; n < set.begins[line + 1]; ++n) {
+      if (n > set.begins[line]) {
+        const SphereArc arc = arcTo(n);
+        const uint64_t pieces = piecesOf(arc);
+        for (uint64_t piece = 1; piece < pieces; ++piece)
+          whole.addOn(arc, n - 1, n, static_cast<double>(piece) / static_cast<double>(pieces));
+      }
+      whole.add(n);
+    }
+    whole.endLine();
+  }
+  return whole.finish();
+}
 
 CurveSet partBetween(const CurveSet& set, double from, double to) {
   PartOfSet part(set);
@@ -303,7 +371,9 @@ CurveSet parseCurveText(std::string_view text, const std::filesystem::path& path
   }
   end_line();
   if (points.empty()) throw Error("{}: has no points; expected lines of x,y,z", path.string());
-  return curveSetOf(points, std::move(begins), std::move(values), std::move(times));
+  CurveSet set = curveSetOf(points, std::move(begins), std::move(values), std::move(times));
+  set.on_sphere = columns->geographic && globe->sphere();
+  return set;
 }
 
 }  // namespace curvisplat

@@ -1,7 +1,8 @@
 // Lines and points to be drawn as tubes and spheres, with perhaps a scalar and a time at each point; and how to read them
 // from text with columns, GeoJSON and shapefiles.
 //
-// Files come from anyone: the memory taken is at most about 20 times the file's size. Any thread may call the functions.
+// Files come from anyone: the memory taken is at most about 20 times the file's size
+// (alongSphere(): about as much again, and 24 MiB). Any thread may call the functions.
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -27,6 +28,7 @@ struct CurveSet {
   std::vector<uint32_t> begins{0};   // [lines + 1], into positions; a line of one point is a sphere
   std::vector<float> values;         // [positions], or none; NaN: no value
   std::vector<double> times = {};    // [positions], or none; they do not decrease along a line
+  bool on_sphere = false;            // it was given in degrees on a sphere around 0,0,0: see alongSphere()
 
   size_t lines() const { return begins.size() - 1; }
   uint64_t bytes() const;
@@ -46,6 +48,10 @@ void requireGlobe(const std::optional<Globe>& globe, const std::filesystem::path
 
 /// The lines with each point as a line of one.
 CurveSet pointsOf(CurveSet set);
+/// The lines of a set that is on_sphere with places between those of long segments, on the great circle, with heights, values and
+/// times that change evenly: so many that segments run below the sphere by at most 1/50,000 of its radius (127 m on the Earth), or
+/// by more where that would take four for each place and a million besides.
+CurveSet alongSphere(const CurveSet& set);
 /// The parts of lines with times in [from, to], ended by the places at these times.
 CurveSet partBetween(const CurveSet& set, double from, double to);
 /// The place of each line at a time, as a point; of those that have one.

@@ -18,9 +18,15 @@ constexpr float kClear = 1e-6f;
 
 void PixelLayers::Row::endPixel(size_t first_layer) {
   const auto begin = layers.begin() + static_cast<std::ptrdiff_t>(first_layer);
-  if (layers.size() > first_layer + 1)  // it allocates
-    std::stable_sort(begin, layers.end(),
-                     [](const PixelLayer& a, const PixelLayer& b) { return a.depth < b.depth; });
+  const auto isNearer = [](const PixelLayer& a, const PixelLayer& b) { return a.depth < b.depth; };
+  constexpr size_t kFew = 12;
+  if (layers.size() <= first_layer + kFew) {
+    for (size_t n = first_layer + 1; n < layers.size(); ++n)
+      for (size_t at = n; at > first_layer && isNearer(layers[at], layers[at - 1]); --at)
+        std::swap(layers[at], layers[at - 1]);
+  } else {
+    std::stable_sort(begin, layers.end(), isNearer);  // it allocates
+  }
   size_t kept = first_layer;
   for (size_t n = first_layer; n < layers.size(); ++n) {
     const PixelLayer layer = layers[n];

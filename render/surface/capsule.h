@@ -12,6 +12,9 @@
 
 #include <glm/vec3.hpp>
 
+#include <array>
+#include <cstddef>
+
 namespace curvisplat {
 
 /// A vertex on the screen. `value` increases with the depth and is linear there: orthographic, the depth;
@@ -55,7 +58,36 @@ struct CapsulePlace {
   glm::vec3 normal;  // in view axes, of length 1
   float along;       // 0 at the first end, 1 at the other; beyond these before a cut end
 };
-CapsulePlace placeOn(const Capsule& capsule, const CapsuleLook& look, float x, float y);
+
+/// Points of the screen, the capsules that they see, and the places of these. The arithmetic is in vectors; a point has the same
+/// bits, whether it is alone or with others.
+class CapsuleSpots {
+ public:
+  static constexpr size_t kAtOnce = 64;
+
+  size_t size() const { return count_; }
+  void clear() { count_ = 0; }
+  /// Adds a point, of which there are at most kAtOnce.
+  void add(const Capsule& capsule, const CapsuleLook& look, float x, float y);
+  /// `look`: of any of the capsules.
+  void findPlaces(const CapsuleLook& look) {
+    look.perspective ? findPlacesIn<true>(look) : findPlacesIn<false>(look);
+  }
+  CapsulePlace place(size_t n) const { return {{normal_x_[n], normal_y_[n], normal_z_[n]}, along_[n]}; }
+
+ private:
+  template <bool kPerspective>
+  void findPlacesIn(const CapsuleLook& look);
+
+  using Row = std::array<float, kAtOnce>;
+  size_t count_ = 0;
+  alignas(64) Row x_, y_;
+  Row ax_, ay_, a_value_, bx_, by_, b_value_;
+  Row a_is_cut_, b_is_cut_;  // 1: by the near plane
+  Row radius_;               // at the first end
+  Row widens_;               // 1: is as many pixels at the other end
+  Row normal_x_, normal_y_, normal_z_, along_;
+};
 
 /// The direction of a capsule, in view axes, of length 1; 0 without a length.
 glm::vec3 axisOf(const Capsule& capsule, const CapsuleLook& look);

@@ -3,16 +3,11 @@
 #include <glm/common.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <numbers>
-#include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include "render/image/image_file.h"
@@ -24,33 +19,20 @@ namespace {
 
 constexpr uint64_t kMaxPixels = uint64_t{1} << 26;
 
-void requireMapSize(int64_t width, int64_t height, const std::string& name) {
+// Bytes that the file of a map has for a pixel at most, and for all else.
+constexpr uint64_t kMaxPixelBytes = 32, kMaxOtherBytes = 64 << 20;
+
+void requireMapSize(ImageSize size, const std::string& name) {
   constexpr int kApart = 2;  // pixels: some programs round
+  const auto [width, height] = size;
   if (width < 2 || std::abs(width - 2 * height) > kApart)
     throw Error(
         "{}: has {} x {} pixels; a map of the whole Earth (equirectangular, from 180 degrees west and 90 "
         "degrees north on) is twice as wide as high",
         name, width, height);
-  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > kMaxPixels)
+  if (size.pixels() > kMaxPixels)
     throw Error("{}: has {} x {} pixels, more than the {} of a map; scale it down", name, width, height,
                 kMaxPixels);
-}
-
-/// Refuses a PNG file by its header: decoded, it takes 24 bytes a pixel, however short the file is.
-void checkPngHeader(const std::filesystem::path& path) {
-  constexpr std::string_view kBegin = "\x89PNG\r\n\x1a\n";
-  const InputFile file(path);
-  std::array<std::byte, 24>
-      header;  // after 8 bytes of length and name, the first chunk has the size, big-endian
-  if (file.size() < header.size()) return;
-  file.readAt(0, std::span(header));
-  if (std::memcmp(header.data(), kBegin.data(), kBegin.size()) != 0) return;
-  const auto number = [&](size_t at) {
-    int64_t value = 0;
-    for (size_t n = 0; n < 4; ++n) value = 256 * value + std::to_integer<int64_t>(header[at + n]);
-    return value;
-  };
-  requireMapSize(number(16), number(20), path.string());
 }
 
 }  // namespace
@@ -124,9 +106,15 @@ glm::vec3 PlacedMap::at(const glm::dvec3& point, double pixel) const {
 }
 
 MapImage readMapImage(const std::filesystem::path& path) {
-  checkPngHeader(path);
+  // By the header first: decoded, an image takes up to 24 bytes a pixel, however short its file is.
+  const ImageSize size = readImageSize(path);
+  requireMapSize(size, path.string());
+  const uint64_t bytes = InputFile(path).size(), most = kMaxPixelBytes * size.pixels() + kMaxOtherBytes;
+  if (bytes > most)
+    throw Error("{}: has {} bytes for {} x {} pixels; expected at most {}", path.string(), bytes, size.width,
+                size.height, most);
   const Image image = readImage(path);
-  requireMapSize(image.size.width, image.size.height, path.string());
+  requireMapSize(image.size, path.string());
   return MapImage(image);
 }
 

@@ -39,15 +39,18 @@ Capsule guarded(const Capsule& capsule, float guard) {
   return {at(from), at(to)};
 }
 
-/// Chooses the points of lines that a picture tells apart: those between which lines are straight, and their values
-/// change evenly, to less than it shows. The first step from a point that was chosen gives the direction.
+/// Chooses the points of lines that a picture tells apart: a chord between two of them passes all points between by no more
+/// than `straightest` pixels, and their values by 1/256 of the range of all.
+///
+/// The first step from a point that was chosen gives a direction. Each point then leaves a disc of slopes beside it in which the
+/// chord has to be, and an interval of what values may change along it; the chooser keeps a disc within all of them.
 class PointChooser {
  public:
   PointChooser(const CurveSet& set, const ScreenView& view, const std::vector<ScreenVertex>& vertices,
                float straightest)
       : set_(set),
         vertices_(vertices),
-        straightest2_(straightest * straightest),
+        straightest_(straightest),
         focal_(static_cast<float>(view.focal_px)),
         perspective_(view.projection == Projection::kPerspective) {
     const auto [low, high] = set.range();
@@ -64,22 +67,12 @@ class PointChooser {
     const glm::vec3 way = wayTo(point);
     const float way2 = glm::dot(way, way);
     const float change = set_.values.empty() ? 0 : set_.values[point] - set_.values[chosen_];
-    bool turns = false;
-    if (has_direction_) {
-      const float along = glm::dot(way, direction_);
-      const glm::vec3 aside = way - along * direction_;
-      turns = !(along >= along_ && glm::dot(aside, aside) <= straightest2_ &&
-                std::abs(change - slope_ * along) <= evenest_);
-      along_ = along;
-    } else if (!(way2 < kNearest * kNearest)) {
-      along_ = std::sqrt(way2);
-      direction_ = way / along_;
-      slope_ = change / along_;
-      has_direction_ = true;
-    }
+    const bool turns = has_direction_ && !goesOnTo(way, change);
     if (turns) {
       begin(before_);
       turnsBefore(point);
+    } else if (!has_direction_ && !(way2 < kNearest * kNearest)) {
+      setDirection(way, std::sqrt(way2), change);
     }
     way_ = way2 <= 0 ? way_ : way;  // NaN: before the near plane
     before_ = point;
@@ -93,6 +86,35 @@ class PointChooser {
   static constexpr float kNearest = 0.5f;        // pixels
   static constexpr float kEvenest = 1.0f / 256;  // of the range of values
 
+  void setDirection(const glm::vec3& way, float length, float change) {
+    has_direction_ = true;
+    direction_ = way / length;
+    along_ = length;
+    slope_ = {};
+    room_ = straightest_ / length;
+    least_rise_ = (change - evenest_) / length;
+    most_rise_ = (change + evenest_) / length;
+  }
+  /// Whether a chord to that point is straight and even; narrows what later ones may be.
+  bool goesOnTo(const glm::vec3& way, float change) {
+    const float along = glm::dot(way, direction_), per_along = 1 / along, rise = per_along * change;
+    const glm::vec3 aside = per_along * way - direction_ - slope_;
+    const float away2 = glm::dot(aside, aside);
+    if (!(along >= along_ && away2 <= room_ * room_ && rise >= least_rise_ && rise <= most_rise_))
+      return false;
+    along_ = along;
+    least_rise_ = std::max(least_rise_, rise - per_along * evenest_);
+    most_rise_ = std::min(most_rise_, rise + per_along * evenest_);
+    const float room = straightest_ * per_along, away = std::sqrt(away2);
+    if (room_ >= room + away) {  // the new disc lies in the old one
+      slope_ += aside;
+      room_ = room;
+    } else if (room < room_ + away) {  // both overlap
+      slope_ += (0.5f * (room_ - room + away) / away) * aside;
+      room_ = 0.5f * (room_ + room - away);
+    }
+    return true;
+  }
   /// The way from the chosen point, in pixels; NaN if one lies before the near plane.
   glm::vec3 wayTo(uint32_t point) const {
     const ScreenVertex &a = vertices_[chosen_], &b = vertices_[point];
@@ -102,12 +124,15 @@ class PointChooser {
 
   const CurveSet& set_;
   const std::vector<ScreenVertex>& vertices_;
-  const float straightest2_, focal_;
+  const float straightest_, focal_;
   const bool perspective_;
   float evenest_ = 0;
   uint32_t chosen_ = 0, before_ = 0;
   glm::vec3 way_{}, direction_{};
-  float along_ = 0, slope_ = 0;
+  float along_ = 0;    // of the last point, which later ones do not fall behind
+  glm::vec3 slope_{};  // of the disc's middle, a pixel along the direction
+  float room_ = 0;     // its radius
+  float least_rise_ = 0, most_rise_ = 0;
   bool has_direction_ = false;
 };
 

@@ -24,6 +24,10 @@
 namespace curvisplat {
 namespace {
 
+// Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and
+// by no more than this many pixels.
+constexpr double kSteepest = 4, kNear = 0.25;
+
 /// The layers that the samples of a row of pixels make, from the nearest on.
 ///
 /// Samples of a pixel whose depths hardly differ are one layer. Its triangles are shaded in the middle of
@@ -68,10 +72,13 @@ class SampledLayers {
     float depth;
   };
 
+  static std::array<Seen, kSamples> sortedOf(const std::array<Seen, kSamples>& seen, size_t count);
   size_t endOfLayer(const std::array<Seen, kSamples>& seen, size_t begin, size_t count) const;
   void appendLayer(std::span<const Seen> seen, int x, int y, size_t& left, unsigned& hidden);
   size_t appendSpots(std::span<const Seen> seen, float middle_x, float middle_y);
   double pixelOf(float value) const;
+  /// An upper bound of toleranceOf(), which takes longer.
+  static double mostTolerance(double pixel) { return kSteepest * pixel + kNear * pixel; }
   double toleranceOf(const Seen& sample) const;
   void shadeBlock(size_t first, size_t count);
 
@@ -86,9 +93,6 @@ class SampledLayers {
   std::vector<size_t> ends_;        // [pixels]
 };
 
-// Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and
-// by no more than this many pixels.
-constexpr double kSteepest = 4, kNear = 0.25;
 constexpr size_t kMaxShaded = 3;  // of a pixel and layer: triangles that do not meet
 constexpr float kSmooth = 0.97f;  // of the cosine between normals: what is in a pixel is lit once
 
@@ -120,30 +124,68 @@ void SampledLayers::append(const PixelSamples& samples, int x, int y, unsigned& 
     ++count;
   }
   if (count == 0) return;
-  size_t left = kSamples - static_cast<size_t>(std::popcount(hidden));
+  size_t left = hidden == 0 ? kSamples : kSamples - static_cast<size_t>(std::popcount(hidden));
   // Most pixels have one layer: its samples need not be in order.
   const double spread = double{farthest} - double{seen[nearest].value};
-  if (spread <= kNear * pixelOf(seen[nearest].value) || spread <= toleranceOf(seen[nearest])) {
+  const double pixel = pixelOf(seen[nearest].value);
+  if (spread <= kNear * pixel || (spread <= mostTolerance(pixel) && spread <= toleranceOf(seen[nearest]))) {
     appendLayer(std::span(seen).first(count), x, y, left, hidden);
     return;
   }
-  for (size_t n = 1; n < count; ++n)  // a few
-    for (size_t at = n; at > 0 && seen[at] < seen[at - 1]; --at) std::swap(seen[at], seen[at - 1]);
+  const std::array<Seen, kSamples> sorted = sortedOf(seen, count);
   for (size_t begin = 0; begin < count;) {
-    const size_t end = endOfLayer(seen, begin, count);
-    appendLayer(std::span(seen).subspan(begin, end - begin), x, y, left, hidden);
+    const size_t end = endOfLayer(sorted, begin, count);
+    appendLayer(std::span(sorted).subspan(begin, end - begin), x, y, left, hidden);
     begin = end;
   }
 }
 
+/// The first `count` in their order, by a network of comparisons, which no branch can predict.
+std::array<SampledLayers::Seen, kSamples> SampledLayers::sortedOf(const std::array<Seen, kSamples>& seen,
+                                                                  size_t count) {
+  std::array<uint64_t, kSamples> keys;
+  std::array<uint32_t, kSamples> from;
+  keys.fill(UINT64_MAX);
+  for (uint32_t n = 0; n < kSamples; ++n) from[n] = n;
+  for (size_t n = 0; n < count; ++n) {
+    // As the order of values, unsigned; + 0 makes one of both zeros.
+    const auto bits = std::bit_cast<uint32_t>(seen[n].value + 0.0f);
+    const uint32_t turned = bits ^ ((bits >> 31) != 0 ? 0xffffffffu : 0x80000000u);
+    keys[n] = uint64_t{turned} << 32 | seen[n].number;
+  }
+  const auto exchange = [&](size_t a, size_t b) {
+    const bool turns = keys[b] < keys[a];
+    const uint64_t low = turns ? keys[b] : keys[a], high = turns ? keys[a] : keys[b];
+    const uint32_t of_low = turns ? from[b] : from[a], of_high = turns ? from[a] : from[b];
+    keys[a] = low;
+    keys[b] = high;
+    from[a] = of_low;
+    from[b] = of_high;
+  };
+  static_assert(kSamples == 8);
+  constexpr uint8_t kNetwork[][2] = {{0, 2}, {1, 3}, {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6},
+                                     {3, 7}, {0, 1}, {2, 3}, {4, 5}, {6, 7}, {2, 4}, {3, 5},
+                                     {1, 4}, {3, 6}, {1, 2}, {3, 4}, {5, 6}};
+  // Unrolled, so that keys stay in registers.
+  [&]<size_t... kAt>(std::index_sequence<kAt...>) {
+    (exchange(kNetwork[kAt][0], kNetwork[kAt][1]), ...);
+  }
+  (std::make_index_sequence<std::size(kNetwork)>());
+  std::array<Seen, kSamples> sorted;
+  for (size_t n = 0; n < count; ++n) sorted[n] = seen[from[n]];
+  return sorted;
+}
+
 /// The first of the sorted samples that is not of the layer that begins at `begin`.
 size_t SampledLayers::endOfLayer(const std::array<Seen, kSamples>& seen, size_t begin, size_t count) const {
+  const double most = mostTolerance(pixelOf(seen[begin].value));  // farther ones have smaller pixels
   double tolerance = 0;
   size_t known = begin;  // the samples before it are in the tolerance
   size_t end = begin + 1;
   for (; end < count; ++end) {
     const double gap = double{seen[end].value} - double{seen[end - 1].value};
     if (gap <= kNear * pixelOf(seen[end].value)) continue;  // whatever the slope
+    if (gap > most) break;                                  // whatever the slope
     for (; known <= end; ++known)
       if (known == begin || seen[known].number != seen[known - 1].number)
         tolerance = std::max(tolerance, toleranceOf(seen[known]));

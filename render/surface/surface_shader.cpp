@@ -164,6 +164,12 @@ void SurfaceShader::mix(const Corners& __restrict c, size_t count, Mixed& __rest
 }
 
 void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> points) const {
+  if (!triangles_.scene().surfaces.empty()) shadeTriangles(spots, points);
+  if (!triangles_.scene().curves.empty()) shadeCapsules(spots, points);
+}
+
+/// Shades those of the spots that see triangles.
+void SurfaceShader::shadeTriangles(std::span<const Spot> spots, std::span<Point> points) const {
   Corners corners{};  // those of capsules are not used
   const auto clear = [](std::array<Corners::Row, 3>& rows) {
     for (Corners::Row& row : rows) row.fill(NAN);
@@ -179,11 +185,7 @@ void SurfaceShader::shadeBlock(std::span<const Spot> spots, std::span<Point> poi
   for (size_t n = 0; n < spots.size(); ++n) {
     const size_t number = triangles_.placeOf(spots[n].number).surface;
     Point& point = points[n];
-    if (triangles_.isCurve(number)) {
-      point.scalar = NAN;
-      shadeCapsule(spots[n], point);
-      continue;
-    }
+    if (triangles_.isCurve(number)) continue;
     const Surface& surface = triangles_.scene().surfaces[number];
     point.normal = {mixed.normal_x[n], mixed.normal_y[n], mixed.normal_z[n]};
     point.opacity = static_cast<float>(surface.opacity.factor);
@@ -232,19 +234,37 @@ void SurfaceShader::smoothJoints(size_t curve, uint32_t end, CapsulePlace& place
   if (length > 0.1f) place.normal = across / length;
 }
 
-void SurfaceShader::shadeCapsule(const Spot& spot, Point& point) const {
+/// Shades those of the spots that see capsules.
+void SurfaceShader::shadeCapsules(std::span<const Spot> spots, std::span<Point> points) const {
+  CapsuleSpots capsules;
+  std::array<uint8_t, kAtOnce> of_capsules;
+  size_t last = 0;
+  for (size_t n = 0; n < spots.size(); ++n) {
+    const auto [curve, end] = triangles_.placeOf(spots[n].number);
+    if (!triangles_.isCurve(curve)) continue;
+    of_capsules[capsules.size()] = static_cast<uint8_t>(n);
+    capsules.add(triangles_.capsuleOf(curve, end), triangles_.lookOf(curve), spots[n].x, spots[n].y);
+    last = curve;
+  }
+  if (capsules.size() == 0) return;
+  capsules.findPlaces(triangles_.lookOf(last));
+  for (size_t n = 0; n < capsules.size(); ++n)
+    shadeCapsule(spots[of_capsules[n]], capsules.place(n), points[of_capsules[n]]);
+}
+
+void SurfaceShader::shadeCapsule(const Spot& spot, CapsulePlace place, Point& point) const {
   const auto [curve, end] = triangles_.placeOf(spot.number);
   const Curves& curves = triangles_.curvesOf(curve);
   const ScreenView& view = triangles_.view();
   constexpr float kWide = 2;  // pixels
   const CapsuleLook& look = triangles_.lookOf(curve);
   const Capsule capsule = triangles_.capsuleOf(curve, end);
-  CapsulePlace place = placeOn(capsule, look, spot.x, spot.y);
   if (look.radiusAt(capsule.a.value) > kWide) smoothJoints(curve, end, place);
   const glm::dvec3 stretched = double{place.normal.x} * view.right + double{place.normal.y} * view.down +
                                double{place.normal.z} * view.forward;
   point.normal = glm::vec3(stretched * view.scale);
   point.opacity = static_cast<float>(curves.opacity);
+  point.scalar = NAN;
   point.colour = curves.colour;
   const std::vector<float>& values = curves.set->values;
   if (values.empty()) return;

@@ -102,7 +102,9 @@ class SurfaceShader {
   void gather(std::span<const Spot> spots, Corners& out) const;
   float isovalueOf(size_t surface) const;
   void shadeBlock(std::span<const Spot> spots, std::span<Point> points) const;
-  void shadeCapsule(const Spot& spot, Point& point) const;
+  void shadeTriangles(std::span<const Spot> spots, std::span<Point> points) const;
+  void shadeCapsules(std::span<const Spot> spots, std::span<Point> points) const;
+  void shadeCapsule(const Spot& spot, CapsulePlace place, Point& point) const;
   glm::dvec3 placeSeen(const Spot& spot) const;
   void shadeMap(const Spot& spot, const PlacedMap& map, Point& point) const;
   void smoothJoints(size_t curve, uint32_t end, CapsulePlace& place) const;

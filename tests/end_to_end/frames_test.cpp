@@ -207,6 +207,21 @@ TEST_F(Frames, APathGoesThroughItsKeyFrames) {
                 {"none.json"});
 }
 
+TEST_F(Frames, CamerasOfAPathMoveWithItsScale) {
+  std::ofstream(file("scaled.json"))
+      << R"({"scale": [1, 1, 2], "key_frames": [{"time": 0, "position": [5, 0, 2], "focal_point": [-0.4, 0, 1],
+      "view_up": [0, 0, 1], "parallel_scale": 1.5}]})";
+  const Words film{"--path", file("scaled.json"), "--frames", "1"};
+  const auto expectCamera = [&](const Words& scale, const Words& camera) {
+    run(cached(Words{"-o", file("scaled_%d.png")} + film + scale));
+    run(cached(Words{"-o", file("still.png"), "--parallel-scale", "1.5"} + camera + scale));
+    EXPECT_EQ(bytes("scaled_0.png"), bytes("still.png")) << scale.back();
+  };
+  expectCamera({"--vertical-scale", "3"}, {"--position", "5,0,2.5", "--focal-point", "-0.4,0,1.5"});
+  expectCamera({"--scale", "1,1,2"}, {"--position", "5,0,2", "--focal-point", "-0.4,0,1"});
+  expectCamera({"--scale", "1,1,1"}, {"--position", "5,0,1.5", "--focal-point", "-0.4,0,0.5"});
+}
+
 TEST_F(Frames, AFilmShowsTheFunctionsAndCutsOfItsKeyFrames) {
   const std::string camera =
       R"("position": [5, 0, 0.5], "focal_point": [-0.4, 0, 0.5], "view_up": [0, 0, 1], "parallel_scale": 1.5)";

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <string>
 #include <tuple>
@@ -284,6 +285,15 @@ TEST_F(GlobeOptions, TheEarthHidesWhatIsBehindIt) {
             50);
   EXPECT_EQ(seen(Words{"--map", "#204060"} + behind).rgba, earth.rgba);
   EXPECT_NE(seen(Words{"--map", "#204060"} + before).rgba, earth.rgba);
+  // A long segment runs along the Earth, not through it: its picture is that of a line of many places.
+  std::string places = "lon,lat\n";
+  for (int n = -60; n <= 60; ++n) places += fmt::format("{},0\n", n);
+  const Words equator{"--map", "#204060", "--lines", csv("long.csv", "lon,lat\n-60,0\n60,0\n")};
+  const Image along = seen(equator), whole = seen({"--map", "#204060", "--lines", csv("places.csv", places)});
+  EXPECT_LT(compareImages(earth, whole).psnr_db, 30);
+  expectSame(along, whole);
+  EXPECT_EQ(seen({"--map", "#204060", "--points", file("long.csv")}).rgba,
+            seen({"--map", "#204060", "--points", csv("two.csv", "lon,lat\n-60,0\n\n60,0\n")}).rgba);
   const auto refused = [](const std::string& cache, const Words& more, int status, const std::string& why) {
     expectRefused(Words{"render", file(cache + ".splats"), "-o", file("a.png")} + more, status, {why});
   };
@@ -302,6 +312,19 @@ TEST_F(GlobeOptions, TheEarthHidesWhatIsBehindIt) {
   overwriteFile(file("large.png"), png);
   refused("sea", {"--map", file("large.png")}, 1,
           "has 30000 x 15000 pixels, more than the 67108864 of a map");
+  writeImage(Image({2, 1}), file("large.exr"));
+  std::string exr = bytesOfFile(file("large.exr"));
+  const size_t window = exr.find("dataWindow") + std::string("dataWindow.box2i.size").size() + 8;
+  exr.replace(window, 8, std::string("\x2f\x75\0\0\x97\x3a\0\0", 8));  // the last column and row
+  overwriteFile(file("large.exr"), exr);
+  refused("sea", {"--map", file("large.exr")}, 1,
+          "large.exr: has 30000 x 15000 pixels, more than the 67108864 of a map");
+  overwriteFile(file("large.pfm"), "PF\n30000 15000\n-1\n");
+  refused("sea", {"--map", file("large.pfm")}, 1,
+          "large.pfm: has 30000 x 15000 pixels, more than the 67108864 of a map");
+  overwriteFile(file("padded.pfm"), "PF\n2 1\n-1\n");
+  std::filesystem::resize_file(file("padded.pfm"), uint64_t{1} << 32);  // sparse
+  refused("sea", {"--map", file("padded.pfm")}, 1, "padded.pfm: has 4294967296 bytes for 2 x 1 pixels; ");
   expectRefused({"view", file("sea.nc"), "--map", "#123456"}, 2, {"--map, --step and --time need a cache"});
   refused("sea", {"--map-height", "2"}, 2, "--map-height 2 needs a map: --map FILE");
   refused("sea", {"--map", "#123456", "--map-height=-1e6"}, 2, "lies below the middle of the Earth");

@@ -66,9 +66,19 @@ class SurfaceOptions : public ProgramSuite<SurfaceOptions> {
 TEST_F(SurfaceOptions, EveryPainterDrawsTheSame) {
   const std::string fine =
       madeCache(file("fine"), "wake", "96x64x48");  // painters differ more in larger splats
+  std::string helix = "x,y,z\n";
+  for (int n = 0; n < 200; ++n)
+    helix += fmt::format("{},{},{}\n", 2 + 0.02 * n, 1.6 * std::sin(0.1 * n), 1.6 * std::cos(0.1 * n));
+  writeFileAtomically(file("helix.csv"), helix);
   for (const char* angle : {"0", "40"}) {
-    Words options{"--surface",   file("sphere.obj"), "--slice", "4,0,0,1,0.2,0.1", "--slice",
-                  "4,0,0,0,0,1", "--slice-opacity",  "0.6",     "--clip-plane",    "2,0,0,1,0,0"};
+    Words options{"--surface",       file("sphere.obj"),
+                  "--slice",         "4,0,0,1,0.2,0.1",
+                  "--slice",         "4,0,0,0,0,1",
+                  "--slice-opacity", "0.6",
+                  "--clip-plane",    "2,0,0,1,0,0",
+                  "--lines",         file("helix.csv"),
+                  "--line-width",    "0.1",
+                  "--lines-opacity", "0.7"};
     if (angle != std::string("0")) options = options + Words{"--view-angle", angle};
     // OpenGL takes a second for a hundred thousand splats.
     const auto with = [&](const Words& more) {

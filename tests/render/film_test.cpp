@@ -134,6 +134,32 @@ TEST_F(FilmTest, BoxesAndPlanesMove) {
   EXPECT_FALSE(film.stated().functions);
 }
 
+/// The place of the data in focus is (2, 3, 4), whatever the scale.
+TEST_F(FilmTest, CamerasKeepTheirPlaceInAnotherScale) {
+  const std::string keys_of_scale =
+      R"({{"scale": {}, "key_frames": [{{"time": 0, "position": [12, 3, 200], "focal_point": [2, 3, 200],
+      "view_up": [0, 0, 1], "view_angle": 20}}]}})";
+  const Film film = read(fmt::format(fmt::runtime(keys_of_scale), "[1, 1, 50]"));
+  EXPECT_EQ(film.scale(), glm::dvec3(1, 1, 50));
+  const Film moved = film.inScale({3, 1, 10});
+  const Camera camera = moved.cameras().at(0);
+  EXPECT_EQ(camera.focal_point, glm::dvec3(6, 3, 40));
+  EXPECT_EQ(camera.position, glm::dvec3(16, 3, 40));
+  EXPECT_EQ(camera.view_angle_deg, 20);
+  const Film again = read(moved.toJson());
+  EXPECT_EQ(again.scale(), glm::dvec3(3, 1, 10));
+  EXPECT_EQ(again.cameras().at(0).position, camera.position);
+  // One that states no scale is for any.
+  const Film any = read(keys({"", ""}));
+  EXPECT_FALSE(any.scale());
+  EXPECT_EQ(any.inScale({1, 1, 50}).cameras().at(0).position, glm::dvec3(5, 0, 0));
+  EXPECT_EQ(any.toJson().find("scale\": ["), std::string::npos);
+  for (const char* wrong : {"[1, 1]", "[1, 0, 1]", "[1, 1, 1e7]", "2"}) {
+    const std::string error = errorOf([&] { read(fmt::format(fmt::runtime(keys_of_scale), wrong)); });
+    EXPECT_NE(error.find("scale"), std::string::npos) << error;
+  }
+}
+
 TEST_F(FilmTest, APathOfCamerasStatesNothingElse) {
   const Film film = read(keys({"", ""}));
   EXPECT_FALSE(film.stated().any());

@@ -5,6 +5,10 @@
 #include <png.h>
 #include <tinyexr.h>
 
+#include <cstdio>  // before jpeglib.h, which needs it
+
+#include <jpeglib.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -252,6 +256,115 @@ TEST(Pfm, RefusesWrongHeaders) {
     EXPECT_THROW(decodePfm(asBytes(header + pixel), "pfm"), Error) << header;
   EXPECT_NO_THROW(decodePfm(asBytes("PF\n1 1\n-1\n" + pixel), "pfm"));
   EXPECT_THROW(decodePfm(asBytes("PF\n1 1\n-1\n" + pixel + "x"), "pfm"), Error);
+}
+
+/// An image as libjpeg writes it: colours in full resolution, or grey.
+Bytes jpegOf(const Image& image, bool progressive, bool grey = false,
+             const std::vector<jpeg_scan_info>& scans = {}) {
+  jpeg_compress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  jpeg.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&jpeg);
+  unsigned char* memory = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&jpeg, &memory, &size);
+  jpeg.image_width = static_cast<JDIMENSION>(image.size.width);
+  jpeg.image_height = static_cast<JDIMENSION>(image.size.height);
+  jpeg.input_components = grey ? 1 : 3;
+  jpeg.in_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&jpeg);
+  jpeg_set_quality(&jpeg, 98, TRUE);
+  jpeg.comp_info[0].h_samp_factor = jpeg.comp_info[0].v_samp_factor = 1;
+  if (progressive) jpeg_simple_progression(&jpeg);
+  if (!scans.empty()) {
+    jpeg.scan_info = scans.data();
+    jpeg.num_scans = static_cast<int>(scans.size());
+  }
+  jpeg_start_compress(&jpeg, TRUE);
+  for (int y = 0; y < image.size.height; ++y) {
+    std::vector<JSAMPLE> row;
+    for (int x = 0; x < image.size.width; ++x)
+      for (int c = 0; c < jpeg.input_components; ++c) row.push_back(toByte(image.pixel(x, y)[c]));
+    JSAMPROW rows = row.data();
+    jpeg_write_scanlines(&jpeg, &rows, 1);
+  }
+  jpeg_finish_compress(&jpeg);
+  jpeg_destroy_compress(&jpeg);
+  const auto* begin = reinterpret_cast<const std::byte*>(memory);
+  Bytes bytes(begin, begin + size);
+  std::free(memory);
+  return bytes;
+}
+
+Image slopes(ImageSize size) {
+  Image image(size);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      const auto across = static_cast<float>(x) / static_cast<float>(size.width),
+                 down = static_cast<float>(y) / static_cast<float>(size.height);
+      const std::array<float, 4> pixel{across, down, 1 - across, 1};
+      std::copy(pixel.begin(), pixel.end(), image.pixel(x, y));
+    }
+  return image;
+}
+
+TEST(Jpeg, ReadsColoursAndGrey) {
+  const Image image = slopes({37, 19});
+  for (const bool progressive : {false, true}) {
+    const Image read = decodeJpeg(jpegOf(image, progressive), "a.jpg");
+    ASSERT_EQ(read.size, image.size);
+    for (size_t n = 0; n < image.rgba.size(); ++n) ASSERT_NEAR(read.rgba[n], image.rgba[n], 6.0 / 255) << n;
+    const Image grey = decodeJpeg(jpegOf(image, progressive, true), "a.jpg");
+    for (size_t n = 0; n < image.rgba.size(); n += 4)
+      for (size_t c = 0; c < 3; ++c) ASSERT_NEAR(grey.rgba[n + c], image.rgba[n], 6.0 / 255) << n;
+  }
+}
+
+TEST(Jpeg, RefusesEveryTruncatedPrefixAndSurvivesFlippedBits) {
+  for (const bool progressive : {false, true}) {
+    const Bytes bytes = jpegOf(slopes({21, 18}), progressive);
+    for (size_t length = 0; length < bytes.size(); ++length)
+      EXPECT_THROW(decodeJpeg(prefixOf(bytes, length), "prefix"), Error) << length;
+    expectToSurviveFlippedBits(bytes, decodeJpeg);
+  }
+}
+
+/// A scan of a few bytes goes through all pixels: a short file would take hours.
+TEST(Jpeg, RefusesTooManyScans) {
+  const auto scansOf = [](int bits) {  // each coefficient in a scan of its own, and each of its last bits
+    std::vector<jpeg_scan_info> scans{{1, {0}, 0, 0, 0, 0}};
+    for (int low = bits; low >= 0; --low)
+      for (int n = 1; n < 64; ++n) scans.push_back({1, {0}, n, n, low == bits ? 0 : low + 1, low});
+    return scans;
+  };
+  EXPECT_EQ(decodeJpeg(jpegOf(slopes({16, 16}), false, true, scansOf(1)), "a.jpg").size, (ImageSize{16, 16}));
+  expectError(
+      [&] {
+        decodeJpeg(jpegOf(slopes({16, 16}), false, true, scansOf(3)), "a.jpg");
+      },
+      {"a.jpg: the JPEG file's pixels cannot be read: it has too many scans"});
+}
+
+TEST(ImageFiles, HaveTheirSizeInTheHeader) {
+  const TemporaryFolder folder;
+  const Image image = slopes({14, 6});
+  for (const char* name : {"a.png", "a.exr", "a.pfm"}) {
+    writeImage(image, folder / name);
+    EXPECT_EQ(readImageSize(folder / name), image.size) << name;
+    // Behind the header anything may be missing.
+    writeFileAtomically(folder / name, readTextFile(folder / name).substr(0, 400));
+    EXPECT_EQ(readImageSize(folder / name), image.size) << name;
+    writeFileAtomically(folder / name, readTextFile(folder / name).substr(0, 9));
+    EXPECT_THROW(readImageSize(folder / name), Error) << name;
+  }
+  const Bytes jpeg = jpegOf(image, false);
+  EXPECT_EQ(sizeOfJpeg(jpeg, "a.jpg"), image.size);
+  EXPECT_THROW(sizeOfJpeg(prefixOf(jpeg, 30), "a.jpg"), Error);
+  writeFileAtomically(folder / "a.jpg", std::string(reinterpret_cast<const char*>(jpeg.data()), jpeg.size()));
+  EXPECT_EQ(readImage(folder / "a.jpg").size, image.size);
+  EXPECT_EQ(readImageSize(folder / "a.jpg"), image.size);
+  writeFileAtomically(folder / "a.pfm", std::string("PF\n70000 1\n-1\n"));
+  EXPECT_THROW(readImageSize(folder / "a.pfm"), Error);
 }
 
 TEST(ImageFiles, AreKnownByTheirBytes) {

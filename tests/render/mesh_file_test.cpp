@@ -246,6 +246,49 @@ TEST(CurveText, DegreesArePlacedOnTheGlobe) {
             "a.csv: line 2: found longitude 1 and latitude 92; expected degrees");
 }
 
+/// The great circle from 0 to 90 degrees east at 60 degrees north passes (1, 1, 2 tan 60) / |...|, and leaves the parallel.
+TEST(CurveText, LongSegmentsFollowTheSphere) {
+  Globe globe;
+  globe.radius_km = 1000;
+  const CurveSet given = parseCurveText(
+      "lon,lat,height,time\n0,60,0,0\n90,60,9000,8\n90,60.5,0,9\n\n0,0,0,0\n180,0,0,1\n\n7,7,0,3\n", "a.csv",
+      "height", globe);
+  ASSERT_TRUE(given.on_sphere);
+  const CurveSet set = alongSphere(given);
+  ASSERT_EQ(set.lines(), 3u);
+  ASSERT_EQ(set.begins[1], 66u);  // 41.4 degrees in 64 pieces; half a degree is one
+  ASSERT_EQ(set.begins[2] - set.begins[1], 257u);
+  ASSERT_EQ(set.values.size(), set.positions.size());
+  ASSERT_EQ(set.times.size(), set.positions.size());
+  const double root = std::sqrt(3.0), length = std::sqrt(2 + 12.0);
+  EXPECT_NEAR(glm::distance(pointOf(set, 32), 1004.5 * glm::dvec3(1, 1, 2 * root) / length), 0, 1e-3);
+  EXPECT_FLOAT_EQ(set.values[32], 4500);
+  EXPECT_DOUBLE_EQ(set.times[32], 4);
+  for (size_t line = 0; line < 2; ++line)
+    for (size_t n = set.begins[line] + 1; n < set.begins[line + 1]; ++n) {
+      const glm::dvec3 a = pointOf(set, n - 1), b = pointOf(set, n);
+      const double sphere = 0.5 * (glm::length(a) + glm::length(b));
+      EXPECT_LT(sphere - glm::length(0.5 * (a + b)), 2.1e-5 * sphere) << n;
+      EXPECT_GE(glm::length(a), 999.999);
+    }
+  // Opposite places are joined by the pole.
+  EXPECT_NEAR(glm::distance(pointOf(set, set.begins[1] + 128), glm::dvec3(0, 0, 1000)), 0, 1e-3);
+  EXPECT_NEAR(glm::distance(pointOf(set, set.begins[2] - 1), glm::dvec3(-1000, 0, 0)), 0, 1e-3);
+  EXPECT_NEAR(glm::distance(pointOf(set, set.begins[2]), pointOf(given, 5)), 0, 1e-3);
+  globe.shape = Globe::Shape::kFlat;
+  EXPECT_FALSE(parseCurveText("lon,lat\n0,0\n90,0\n", "a.csv", "", globe).on_sphere);
+  EXPECT_FALSE(curves("x,y,z\n0,0,9\n90,0,9\n").on_sphere);
+}
+
+/// A file may take little more memory, whatever its lines.
+TEST(CurveText, ManyLongSegmentsHaveFewerPieces) {
+  std::string text = "lon,lat\n";
+  for (int n = 0; n < 20000; ++n) text += n % 2 == 0 ? "0,0\n" : "179,0\n";
+  const CurveSet set = alongSphere(parseCurveText(text, "a.csv", "", Globe{}));
+  EXPECT_LT(set.positions.size(), 5 * 20000 + (1u << 20));
+  EXPECT_GT(set.positions.size(), 16 * 20000u);
+}
+
 TEST(CurveSet, ATimeShowsThePartBeforeIt) {
   const CurveSet set = curves(
       "x,y,z,time,speed,id\n0,0,0,0,1,a\n4,0,0,2,3,a\n4,8,0,6,5,a\n9,9,9,5,1,b\n9,9,10,7,1,b\n", "speed");

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -434,6 +435,44 @@ TEST_P(Rasterizer, DrawsThePointsAtWhichALineOrItsValuesTurn) {
   ASSERT_EQ(of_values.size(), 3u);
   EXPECT_NEAR(of_values[0], 200, 3);
   EXPECT_NEAR(of_values[1], 400, 5);
+}
+
+/// Chords of a helix pass all of its points, and values, closely: and they are not many more than those of an arc of that sagitta.
+TEST_P(Rasterizer, ChordsPassAllPointsClosely) {
+  constexpr int kPoints = 4000;
+  constexpr double kRadius = 1, kTurns = 3, kSagitta = 0.15;
+  std::vector<glm::dvec3> helix;
+  for (int n = 0; n < kPoints; ++n) {
+    const double angle = 2 * std::numbers::pi * kTurns * n / (kPoints - 1);
+    helix.emplace_back(0.4 * angle / kTurns - 1, kRadius * std::cos(angle), kRadius * std::sin(angle));
+  }
+  SurfaceScene scene;
+  scene.curves.push_back(lineOf(helix, 0.2));
+  CurveSet set = *scene.curves[0].set;
+  for (int n = 0; n < kPoints; ++n) set.values.push_back(static_cast<float>(std::sin(0.004 * n)));
+  scene.curves[0].set = std::make_shared<CurveSet>(set);
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const SceneTriangles triangles(scene, view, 0);
+  const bool perspective = GetParam() == Projection::kPerspective;
+  size_t chords = 0;
+  for (uint32_t end = 0; end < kPoints; ++end) {
+    const uint32_t begin = triangles.beginOf(0, end);
+    if (begin == SceneTriangles::kNoCapsule) continue;
+    ++chords;
+    const glm::dvec3 a = helix[begin], way = helix[end] - a;
+    for (uint32_t n = begin; n <= end; ++n) {
+      const double part = glm::dot(helix[n] - a, way) / glm::dot(way, way);
+      const double pixel = (perspective ? view.viewFromData(helix[n]).z : 1) / view.focal_px;
+      ASSERT_LT(glm::length(helix[n] - a - part * way), (kSagitta + (perspective ? 0.05 : 0.02)) * pixel)
+          << begin << " " << n;
+      ASSERT_NEAR(set.values[n], set.values[begin] + part * (set.values[end] - set.values[begin]), 2.1 / 256);
+    }
+  }
+  const double nearest = perspective ? view.viewFromData({0, 0, 0}).z - kRadius : 1;
+  const double radius_px = kRadius * view.focal_px / nearest;
+  const double of_arcs = kTurns * std::numbers::pi / std::acos(1 - kSagitta / radius_px);
+  EXPECT_GT(chords, 20u);
+  EXPECT_LT(static_cast<double>(chords), 1.5 * of_arcs + 10);
 }
 
 TEST_P(Rasterizer, StopsWithinATileOfManyTriangles) {

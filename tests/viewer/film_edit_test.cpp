@@ -141,6 +141,34 @@ TEST(FilmEdit, OpensAPathOfCamerasWithTheViewThatIsShown) {
   EXPECT_FALSE(film.keys()[0].frame.series_time);
 }
 
+/// The key frames move as ViewState::setVerticalScale() moves the camera that is shown.
+TEST(FilmEdit, CamerasFollowTheVerticalScale) {
+  FilmEdit film;
+  film.add(view(3), {});
+  film.add(view(5), {});
+  const uint64_t picture = film.keys()[1].picture;
+  ViewState state = view(5);
+  state.setVerticalScale(20, std::nullopt);
+  film.follow(state.scale);
+  EXPECT_EQ(film.keys()[1].frame.camera.position, state.camera.position);
+  EXPECT_EQ(film.film()->cameras().at(0).focal_point, glm::dvec3(1, 0.5, 10));
+  EXPECT_EQ(film.film()->cameras().at(0).position, glm::dvec3(3, 0, 11.5));
+  EXPECT_EQ(film.film()->scale(), glm::dvec3(1, 1, 20));
+  EXPECT_NE(film.keys()[1].picture, picture);
+  const auto same = film.film();
+  film.follow(state.scale);
+  EXPECT_EQ(film.film(), same);
+  // A view of another scale moves the others, and so does the window that opens a film.
+  film.goTo(1);
+  film.add(view(7), {});
+  EXPECT_EQ(film.keys()[0].frame.camera.position, glm::dvec3(3, 0, 2));
+  FilmEdit opened;
+  opened.open(*same, view(), {});
+  EXPECT_EQ(opened.keys()[1].frame.camera.position, glm::dvec3(5, 0, 2));
+  opened.follow(state.scale);
+  EXPECT_EQ(opened.keys()[1].frame.camera.position, state.camera.position);
+}
+
 TEST(RenderCommand, OfAFilmLeavesOutWhatTheFilmStates) {
   ViewState state = view();
   state.clip_box = WorldBox{{0, 0, 0}, {1, 1, 1}};

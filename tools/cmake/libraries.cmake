@@ -2,7 +2,7 @@
 # installed package. Whoever includes this has defined
 #   curvisplat_find(PACKAGE ...)       as find_package
 #   curvisplat_find_pkg(NAME MODULE)   as pkg_check_modules, with the target PkgConfig::NAME
-# and has CURVISPLAT_ANNOTATIONS and CURVISPLAT_PORTABLE set.
+# and has CURVISPLAT_ANNOTATIONS, CURVISPLAT_SERVER and CURVISPLAT_PORTABLE set.
 list(APPEND CMAKE_MODULE_PATH "${CMAKE_CURRENT_LIST_DIR}")
 curvisplat_find(Threads)
 curvisplat_find(TBB)
@@ -27,6 +27,9 @@ curvisplat_find_pkg(BLOSC blosc)
 curvisplat_find_pkg(LZMA liblzma)
 if(NOT CURVISPLAT_PORTABLE)
   curvisplat_find_pkg(URING liburing)
+endif()
+if(CURVISPLAT_SERVER)
+  curvisplat_find(JPEG)
 endif()
 if(CURVISPLAT_ANNOTATIONS)
   curvisplat_find_pkg(CAIRO cairo)

@@ -170,6 +170,8 @@ void render(const RenderArguments& given) {
   const Manifest manifest = cache.manifest();  // of the first step
   const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
   options.scale = verticallyScaled(options.scale, arguments.frame.vertical_scale, globe);
+  if (arguments.camera.film)
+    arguments.camera.film = std::make_shared<const Film>(arguments.camera.film->inScale(options.scale));
   const size_t shown = chooseVariable(cache, arguments.scalar);
   const ChosenFor drawn = drawnSteps(arguments);
   ScalarChoice choice = chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options, drawn);

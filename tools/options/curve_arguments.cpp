@@ -95,8 +95,10 @@ CurveSet setOf(CfTrajectories trajectories, const std::filesystem::path& path, c
   // Lengths of a grid that no NetCDF file describes are what they are there.
   for (glm::dvec3& point : trajectories.points)
     point = place.globe ? place.globe->placeAt(point) : 1e3 * point;
-  return curveSetOf(trajectories.points, std::move(trajectories.begins), std::move(trajectories.values),
-                    std::move(times));
+  CurveSet set = curveSetOf(trajectories.points, std::move(trajectories.begins),
+                            std::move(trajectories.values), std::move(times));
+  set.on_sphere = trajectories.degrees && place.globe->sphere();
+  return set;
 }
 
 CurveSet read(const std::filesystem::path& path, const std::string& scalar, bool as_points,
@@ -220,7 +222,10 @@ std::vector<Curves> curvesOf(const CurveArguments& arguments, const CacheReader&
     for (const std::string& file : *files) {
       const size_t n = all.size();
       Curves& curves = all.emplace_back();
-      curves.set = std::make_shared<CurveSet>(read(file, arguments.by, as_points, place));
+      CurveSet set = read(file, arguments.by, as_points, place);
+      // Places that are drawn are those of the file; where they are at other times lies on the way between these.
+      const bool has_ways = !as_points || (follows && !set.times.empty());
+      curves.set = std::make_shared<CurveSet>(set.on_sphere && has_ways ? alongSphere(set) : std::move(set));
       curves.places = as_points;
       followSeries(curves, arguments.time, follows);
       const Width width = as_points ? parseWidth("--point-size", arguments.point_size)

@@ -66,6 +66,9 @@ set(development_packages
 if(CURVISPLAT_ANNOTATIONS)
   list(APPEND development_packages libcairo2-dev)
 endif()
+if(CURVISPLAT_SERVER)
+  list(APPEND development_packages libjpeg-dev)
+endif()
 if(CURVISPLAT_PYTHON)
   list(APPEND CPACK_COMPONENTS_ALL python)
   set(CPACK_DEBIAN_PYTHON_DESCRIPTION "The Python package curvisplat: grids from files or numpy arrays become caches,

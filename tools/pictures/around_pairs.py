@@ -5,7 +5,7 @@
 
 DATA is a folder like shared/data. Writes FOLDER/around_NAME.png: ours at the left, VTK's at the right, and each alone as
 NAME_ours.png and NAME_vtk.png. Scenes: the delta wing with its vortex, the blunt fin with fin and plate, a duct with a slice, a
-globe with a cut. VTK draws the best that a patient user gets of it: no resampled volume, but the grid's own cells, cut into
+globe with a cut; the wing with its vortex lines, a sea with coast and points, a torus with field lines, as tubes and spheres. VTK draws the best that a patient user gets of it: no resampled volume, but the grid's own cells, cut into
 tetrahedra (vtkProjectedTetrahedraMapper) and clipped as such, with the same extinction per length; surfaces and slices from the
 grid itself, blocks joined, smooth, with our light; all of it at twice the size and averaged. Needs Debian's python3-vtk9, and xvfb.
 """
@@ -20,6 +20,7 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
+import flow_lines
 import vtk_grids
 
 WIDTH, HEIGHT = 480, 360
@@ -43,6 +44,17 @@ SCENES = {
     "globe": dict(generate="globe", scalar="f", vtk="Function0", slice=(0, 0, 0, 0, 1, 0), cut=(0, 0, 0, 0, 1, 0), surface="kmin",
                   opacity=1, faces=[(2, 0, None)], volume=([(0, 0.02), (0.5, 0.05), (1, 0.9)], 0.05), position=(3, 9, 4),
                   focal=(0, 0, 0), scale=1.15, of_radius=True),
+    "wing_lines": dict(files=["delta_wing/delta_vertex.cgns"], scalar="Density", vtk="Density", range=(0.86, 0.985),
+                       volume=([(0, 0.8), (0.5, 0.2), (1, 0)], 0.05), faces=[(2, 0, (0, 23))], surface="kmin:i=0-23", opacity=1,
+                       position=(-0.9, 1.2, 0.9), focal=(0.5, 0.14, 0.06), scale=0.3, made=flow_lines.wing,
+                       tubes=[("wing_vortex_lines.vtp", 0.004, "#ffd040"), ("wing_streamlines.vtp", 0.004, "#58c8ff")]),
+    "sea": dict(files=["nemo_northsea/nemo_northsea_u.xyz", "nemo_northsea/nemo_northsea_u.fun"], scalar="uo", vtk="Function0",
+                range=(-0.4, 0.4), volume=([(0, 0.9), (0.3, 0.25), (0.5, 0.04), (0.7, 0.25), (1, 0.9)], 4), blanked=True,
+                position=(6000, -760, 10500), focal=(3000, -380, 5250), scale=900, made=flow_lines.sea,
+                tubes=[("sea_coast.vtp", 8, "#303030")], balls=[("sea_points.vtp", 24, "#ff8000")]),
+    "torus": dict(made=flow_lines.torus, scalar="pressure", vtk="pressure", range=(0, 1),
+                  volume=([(0, 0), (0.3, 0.1), (1, 0.5)], 0.3), position=(-7, -9, 7), focal=(0, 0, 0), scale=3.3,
+                  tubes=[("torus_lines.vtp", 0.06, "#c04080")]),
 }
 
 
@@ -60,7 +72,8 @@ def commas(numbers):
 def ours(program, cache, scene, picture):
     words = ["render", cache, "-o", picture, "--size", f"{WIDTH}x{HEIGHT}", "--scalar", scene["scalar"], "--tf", "viridis",
              "--range", commas(scene["range"]), f"--position={commas(scene['position'])}",
-             f"--focal-point={commas(scene['focal'])}", "--parallel-scale", scene["scale"], "--view-up", "0,0,1"]
+             f"--focal-point={commas(scene['focal'])}", "--parallel-scale", scene["scale"], "--view-up", "0,0,1",
+             "--background", "white"]
     if "volume" in scene:
         points, unit = scene["volume"]
         words += ["--opacity", ",".join(f"{x}:{a}" for x, a in points), "--opacity-unit", unit]
@@ -71,6 +84,11 @@ def ours(program, cache, scene, picture):
     for option in ("slice", "cut"):
         if option in scene:
             words += [f"--{'clip-plane' if option == 'cut' else 'slice'}={commas(scene[option])}"]
+    for option, size, things in (("--lines", "--line-width", "tubes"), ("--points", "--point-size", "balls")):
+        for file, width, _ in scene.get(things, []):
+            words += [option, picture.parent / file, size, width] if size not in words else [option, picture.parent / file]
+    for *_, colour in scene.get("tubes", []) + scene.get("balls", []):
+        words += ["--lines-colour", colour]
     run(program, *words)
 
 
@@ -139,9 +157,39 @@ def faces_of(grids, scene):
     return faces
 
 
+def things_of(scene, folder):
+    """Ports with lines as tubes and points as spheres, and their colours."""
+    for file, width, colour in scene.get("tubes", []) + scene.get("balls", []):
+        reader = vtk.vtkXMLPolyDataReader()
+        reader.SetFileName(str(folder / file))
+        if (file, width, colour) in scene.get("tubes", []):
+            shape = vtk.vtkTubeFilter()
+            shape.SetRadius(0.5 * width)
+            shape.SetNumberOfSides(16)
+            shape.CappingOn()
+        else:
+            ball, shape = vtk.vtkSphereSource(), vtk.vtkGlyph3D()
+            ball.SetRadius(0.5 * width)
+            ball.SetThetaResolution(16)
+            ball.SetPhiResolution(16)
+            shape.SetSourceConnection(ball.GetOutputPort())
+            shape.ScalingOff()
+        shape.SetInputConnection(reader.GetOutputPort())
+        yield shape, [int(colour[n:n + 2], 16) / 255 for n in (1, 3, 5)]
+
+
 def volume_of(grids, scene):
     """Tetrahedra of what the cut leaves. The mapper takes what it calls opacity for the extinction over the unit, in bytes."""
     cells = joined(grids, scene)
+    if scene.get("blanked"):
+        drawn = vtk.vtkThreshold()
+        drawn.SetInputData(cells)
+        drawn.SetInputArrayToProcess(0, 0, 0, vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS, "IBlank")
+        drawn.SetUpperThreshold(0.5)
+        drawn.SetThresholdFunction(vtk.vtkThreshold.THRESHOLD_UPPER)
+        drawn.AllScalarsOn()
+        drawn.Update()
+        cells = drawn.GetOutput()
     if "cut" in scene:
         clip = vtk.vtkTableBasedClipDataSet()
         clip.SetInputData(cells)
@@ -189,6 +237,8 @@ def by_vtk(grids, scene, picture):
             normals = vtk.vtkPolyDataNormals()
             normals.SetInputConnection(face.GetOutputPort())
             renderer.AddActor(actor_of(normals.GetOutputPort(), scene, GREY, scene["opacity"]))
+    for shape, colour in things_of(scene, picture.parent):
+        renderer.AddActor(actor_of(shape.GetOutputPort(), scene, colour))
     if "slice" in scene:
         cutter = vtk.vtkCutter()
         cutter.SetCutFunction(plane_of(scene["slice"]))
@@ -239,12 +289,13 @@ def write_png(path, pixels):
 
 
 def prepared(name, scene, data, folder, program):
-    """The scene's files, and its cache."""
+    """The scene's files, and its cache; its lines are in the folder."""
+    made = scene["made"](data, folder) if "made" in scene else []
     if "generate" in scene:
         run(program, "generate", scene["generate"], "--size", "96x96x24", "-o", folder / name)
         files = [folder / f"{name}.xyz", folder / f"{name}.fun"]
     else:
-        files = [data / file for file in scene["files"]]
+        files = [data / file for file in scene["files"]] if "files" in scene else made[:1]
     cache = folder / f"{name}.splats"
     run(program, "convert", *files, "-o", cache, "--overwrite")
     return files, cache

@@ -4,7 +4,8 @@
     tools/pictures/make_pictures.py DATA [--program build/release/tools/curvisplat] [--only NAME,...]
 
 DATA has the grids: bluntfinxyz.bin and bluntfinq.bin, delta_vertex.cgns, nemo_northsea_u.xyz and .fun, face1_*.vts to face6_*.vts,
-anywhere below it. The window is drawn on a virtual display (Xvfb, xwd).
+anywhere below it. The window is drawn on a virtual display (Xvfb, xwd). `sea` and `torus` need Debian's python3-vtk9, by which their
+lines are computed (flow_lines.py); around_pairs.py draws them beside VTK's.
 """
 import argparse
 import os
@@ -28,7 +29,10 @@ CACHES = {
     "currents": (["nemo_northsea_u.xyz", "nemo_northsea_u.fun"], ["--scalar", "uo"]),
     "globe": ([f"face{n}_*.vts" for n in range(1, 7)], ["--scalar", "T"]),
     "wake": (["wake.xyz", "wake.fun"], []),
+    "torus": (["torus.vts"], []),
 }
+# picture: a function of flow_lines.py, which writes the files that its options name, and perhaps the grid
+LINES_OF = {"sea": "sea", "torus": "torus"}
 # picture: (cache, options of render)
 PICTURES = {
     "fin": ("fin", ["--scalar", "mach_number", "--opacity-by", "pressure_gradient_magnitude", "--size", "960x540", "--surface",
@@ -46,6 +50,14 @@ PICTURES = {
     "globe": ("globe", ["--tf", "thermal", "--range=-2,30", "--opacity", "0:0.9,1:0.9", "--opacity-unit", "30", "--size", "960x540",
                         "--position", "14000,-12000,8000", "--focal-point", "0,0,0", "--view-angle", "40", "--light", "0.5,0.5,0",
                         "--light-direction", "1,-0.2,0.8", "--scalar-bar"]),
+    "sea": ("currents", ["--tf", "cool-warm", "--range=-0.4,0.4", "--opacity", "0:0.9,0.3:0.25,0.5:0.04,0.7:0.25,1:0.9",
+                         "--opacity-unit", "4", "--size", "960x600", "--position", "6000,-760,10500", "--focal-point", "3000,-380,5250",
+                         "--view-up", "0,0,1", "--view-angle", "16", "--lines", "sea_coast.vtp", "--line-width", "1.5px", "--points",
+                         "sea_points.vtp", "--point-size", "7px", "--lines-colour", "#d0c8a0", "--lines-colour", "#ffd040"]),
+    "torus": ("torus", ["--tf", "thermal", "--range", "0,1", "--opacity", "0:0,0.3:0.1,1:0.5", "--opacity-unit", "0.3", "--size",
+                        "960x600", "--lines", "torus_lines.vtp", "--lines-by", "B", "--line-width", "0.06", "--shadow", "0.8",
+                        "--light-direction", "0.3,-0.5,1", "--surface", "torus_floor.vtp", "--surface-colour", "#a0a4aa",
+                        "--position=-7,-9,7", "--focal-point", "0,0,-0.3", "--view-angle", "28", "--no-scalar-bar"]),
     "wake": ("wake", ["--tf", "glow", "--opacity-unit", "0.034", "--position", "7.2,-10,8", "--focal-point", "3.2,0,2",
                       "--view-angle", "34", "--size", "960x600"]),
 }
@@ -105,7 +117,7 @@ def main():
         folder = pathlib.Path(name)
 
         def run(*words):
-            subprocess.run([program, *words], check=True)
+            subprocess.run([program, *words], check=True, cwd=folder)
 
         def found(file):
             if (folder / file).exists():
@@ -126,6 +138,9 @@ def main():
                 draw_window(program, cache_of("fin"), folder)
             else:
                 cache, options = PICTURES[picture]
+                if picture in LINES_OF:
+                    import flow_lines  # needs VTK
+                    getattr(flow_lines, LINES_OF[picture])(arguments.data, folder)
                 run("render", cache_of(cache), "-o", HERE / f"{picture}.png", *options)
 
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "render/surface/surface_scene.h"
 #include "stream/base/error.h"
@@ -63,8 +64,8 @@ void FilmEdit::take(std::vector<Key> keys, const std::string& scalar) {
       frames.push_back(key.frame);
       looks.push_back(key.look);
     }
-    film_ =
-        std::make_shared<const Film>(CameraPath(std::move(frames), kName), std::move(looks), scalar, kName);
+    film_ = std::make_shared<const Film>(CameraPath(std::move(frames), kName), std::move(looks), scalar,
+                                         kName, scale_);
   } else {
     film_.reset();
   }
@@ -72,7 +73,19 @@ void FilmEdit::take(std::vector<Key> keys, const std::string& scalar) {
   stop();
 }
 
+void FilmEdit::follow(const glm::dvec3& scale) {
+  const glm::dvec3 before = std::exchange(scale_, scale);
+  if (keys_.empty() || before == scale) return;
+  std::vector<Key> keys = keys_;
+  for (Key& key : keys) {
+    key.frame.camera = rescaled(key.frame.camera, before, scale);
+    key.picture = ++pictures_;
+  }
+  take(std::move(keys), film_->scalar());
+}
+
 void FilmEdit::add(const ViewState& state, std::optional<double> series_time) {
+  follow(state.scale);
   std::vector<Key> keys = keys_;
   Key& key = keys.emplace_back(keyOf(state, series_time));
   if (const auto behind = selected()) {
@@ -88,6 +101,7 @@ void FilmEdit::add(const ViewState& state, std::optional<double> series_time) {
 void FilmEdit::replace(const ViewState& state, std::optional<double> series_time) {
   const auto key = selected();
   if (!key) return;
+  follow(state.scale);
   std::vector<Key> keys = keys_;
   keys[*key] = keyOf(state, series_time);
   take(std::move(keys), state.variable);
@@ -117,7 +131,9 @@ void FilmEdit::goTo(double time) {
   time_ = std::clamp(time, begin(), end());
 }
 
-void FilmEdit::open(const Film& film, const ViewState& state, std::optional<double> series_time) {
+void FilmEdit::open(const Film& opened, const ViewState& state, std::optional<double> series_time) {
+  const Film film = opened.inScale(state.scale);
+  scale_ = state.scale;
   std::vector<Key> keys;
   const KeyLook shown = lookOf(state);
   const Film::Stated& has = film.stated();

@@ -53,9 +53,11 @@ class FilmEdit {
   /// Moves a key frame in time, perhaps past others; time() goes with it. Does nothing where it would lie on another one.
   void move(size_t key, double time);
   void goTo(double time);
+  /// Moves the cameras as the data's scale in the window changes: each keeps the place that it looks at.
+  void follow(const glm::dvec3& scale);
   /// Takes the place of the film with another one, of which each key frame gets what it does not state from the view.
   /// Times begin at 0.
-  void open(const Film& film, const ViewState& state, std::optional<double> series_time);
+  void open(const Film& opened, const ViewState& state, std::optional<double> series_time);
   /// Takes the key frames of an earlier state of itself, if they are others. Small pictures keep their numbers.
   void goBackTo(const FilmEdit& earlier);
 
@@ -72,6 +74,7 @@ class FilmEdit {
 
   std::vector<Key> keys_;
   std::shared_ptr<const Film> film_;
+  glm::dvec3 scale_{1.0};  // of the views that the cameras are from
   uint64_t pictures_ = 0;  // the newest Key::picture
   double time_ = 0;
   std::optional<double> began_s_;  // when time 0 was, by the caller's clock

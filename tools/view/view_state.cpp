@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "render/automatic/first_choice.h"
+#include "render/camera/camera_path.h"
 #include "render/colour/function_parts.h"
 #include "render/mesh/triangle_mesh.h"
 #include "stream/base/error.h"
@@ -343,10 +345,8 @@ double ViewState::verticalScale(const std::optional<Globe>& globe) const {
 
 void ViewState::setVerticalScale(double factor, const std::optional<Globe>& globe) {
   const double stretched = factor / (globe ? std::abs(globe->vertical_scale) : 1);
-  const double rise = camera.focal_point.z * (stretched / scale.z - 1);
-  camera.focal_point.z += rise;
-  camera.position.z += rise;
-  scale.z = stretched;
+  const glm::dvec3 to(scale.x, scale.y, stretched);
+  camera = rescaled(camera, std::exchange(scale, to), to);
 }
 
 FrameOptions ViewState::frameOptions(ImageSize size) const {

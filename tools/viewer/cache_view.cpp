@@ -308,6 +308,7 @@ void CacheView::react(const WindowLayout& layout) {
   changed_ |= navigated;
   PanelActions actions;
   if (layout.shows_panels) actions = drawPanels(layout);
+  film_.follow(state_.scale);  // which the panels may have changed
   if (isSeries()) drawTimeBar(cache_, playback_, layout.time, actions);
   reports_.attempt([&] { apply(actions); });
   if (state_.giveOpacitiesBack()) {
