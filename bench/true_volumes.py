@@ -4,7 +4,7 @@
     bench/true_volumes.py FOLDER [--only REGEX] [--quick] [--program PROGRAM] [--dump DUMP_CACHE] [--convert=OPTION ...] [--json OUT.json]
 
 Each grid has one trouble of real ones: cells that grow quickly from a wall, closed rows, one layer of cells, joints at an angle,
-steep terrain, poles, an ocean's floor in steps. The columns:
+steep terrain, poles, an ocean's floor in steps, a mesh that is refined 2:1. The columns:
 
 weights         sum of the splats' weights over the grid's volume (of trilinear cells, exact by quadrature)
 uniform         the least and the largest total optical depth of four views, over the exact one
@@ -58,7 +58,9 @@ def determinant(corners, u, v, w):
 
 
 def drawn_cells(xyz, values):
-    """Corners of the cells that are drawn (those without NaN), and the values at them (or theirs)."""
+    """Corners of the cells that are drawn (those without NaN), and the values at them (or theirs). A mesh comes as such corners."""
+    if xyz.ndim == 3:
+        return xyz, values.reshape(len(xyz), -1, 1), values.ndim == 2
     of_nodes = values.shape == xyz.shape[:3]
     f = cell_corners(np.repeat(values[..., None], 3, -1))[..., :1] if of_nodes else values.reshape(-1, 1, 1)
     there = ~np.isnan(f).any(axis=(1, 2))
@@ -211,6 +213,30 @@ def grids():
     levels = lattice(np.linspace(0, 10, 26), np.linspace(0, 8, 21), -growing(0.05, 1.2, 14), lambda x, y, z: (x, y, z))
     yield "sea_floor", [with_land(*nodes(levels, lambda x, y, z: z + 0.2 * x))]
     yield "sea_floor_cells", [with_land(*cells(levels, lambda x, y, z: z + 0.2 * x))]
+    octree = refined_mesh(8, 2)
+    yield "octree", [(octree, octree[..., 2])]
+    yield "octree_cells", [(octree, octree[..., 2].mean(axis=1))]
+
+
+def refined_mesh(base, levels):
+    """Corners of the cubes of an octree, fine near a sphere: neighbours differ by one level at most, and nodes hang."""
+    cells = {(0, *c) for c in np.ndindex(base, base, base)}
+
+    def split(cell):
+        cells.remove(cell)
+        cells.update((cell[0] + 1, *(2 * np.array(cell[1:]) + c).tolist()) for c in np.ndindex(2, 2, 2))
+    for level in range(levels):
+        size = 1 / (base << level)
+        for cell in sorted(c for c in cells if c[0] == level):
+            if abs(np.linalg.norm((np.array(cell[1:]) + 0.5) * size - 0.45) - 0.3) < (1.2 if level == 0 else 0.8) * size:
+                split(cell)
+        coarse = True
+        while coarse:
+            coarse = {(up, *above) for c in cells for axis in range(3) for side in (-1, 1) for up in range(c[0] - 1)
+                      if (up, *(above := tuple(int(x) + side * (n == axis) >> c[0] - up for n, x in enumerate(c[1:])))) in cells}
+            for cell in sorted(coarse):
+                split(cell)
+    return np.array([[(np.array(c[1:]) + (n & 1, n >> 1 & 1, n >> 2)) / (base << c[0]) for n in range(8)] for c in sorted(cells)])
 
 
 def with_land(xyz, values):
@@ -249,8 +275,30 @@ def write_cells(path, xyz, values):
     return [path.with_suffix(".vts")]
 
 
+def write_mesh(path, corners, values):
+    points, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    cells = numbers.reshape(-1, 8)[:, [0, 1, 3, 2, 4, 5, 7, 6]]
+    of_points = values.ndim == 2
+    if of_points:
+        values = values.reshape(-1)[np.unique(numbers, return_index=True)[1]]
+
+    def array(kind, name, data, components=1):
+        text = " ".join(f"{x:.17g}" for x in np.ravel(data))
+        return f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="ascii">{text}</DataArray>'
+    data = "PointData" if of_points else "CellData"
+    path.with_suffix(".vtu").write_text(
+        '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid>'
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}"><{data}>{array("Float64", "f", values)}</{data}>'
+        f'<Points>{array("Float64", "points", points, 3)}</Points><Cells>{array("Int64", "connectivity", cells)}'
+        f'{array("Int64", "offsets", 8 * np.arange(1, len(cells) + 1))}{array("UInt8", "types", np.full(len(cells), 12))}</Cells>'
+        "</Piece></UnstructuredGrid></VTKFile>")
+    return [path.with_suffix(".vtu")]
+
+
 def write(path, blocks):
     xyz, values = blocks[0]
+    if xyz.ndim == 3:
+        return write_mesh(path, xyz, values)
     return write_plot3d(path, blocks) if values.shape == xyz.shape[:3] else write_cells(path, xyz, values)
 
 

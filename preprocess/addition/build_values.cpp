@@ -156,10 +156,9 @@ void ValueBuilder::decode(uint32_t position, const LoadedValues& loaded, BrickSp
 /// The values of a leaf's splats, in the order in which it stores them: by node. Each must be where it was.
 void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSplats& brick) const {
   constexpr const char* kOtherGrid = "this grid is not the one the cache was made from";
-  constexpr const char* kOtherPlace =
-      "this grid is not the one the cache was made from, or an earlier version of this program, which placed "
-      "some splats elsewhere, "
-      "made it: convert again";
+  constexpr const char* kOtherSplat =
+      "this grid is not the one the cache was made from, or an earlier version of this program, whose splats "
+      "were others, made it: convert again";
   const RecordSpan records = loaded.records(position);
   if (records.size() != brick.size())
     refuse(position, fmt::format("it has {} splats, but the grid has {} there; {}", brick.size(),
@@ -181,6 +180,15 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
     return near;
   };
 
+  // Slopes are along the columns of the splat's A. Axes that the cache has rounded are a step apart at the most.
+  constexpr int kAlike = 2;
+  const auto isAlike = [&](const std::array<uint32_t, 3>& stored, const std::array<uint32_t, 3>& found) {
+    bool alike = true;
+    for (size_t axis = 0; axis < 3; ++axis)
+      alike &= std::abs(static_cast<int>(stored[axis]) - static_cast<int>(found[axis])) <= kAlike;
+    return alike;
+  };
+
   brick.variables.resize(variables_);
   for (auto& values : brick.variables) values.resize(brick.size());
   std::vector<SplatScalar> values(variables_);
@@ -193,9 +201,13 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
       if (node != first + in_run)
         refuse(position, fmt::format("it has {}, but the grid has {} there; {}",
                                      numbers_.nameOf(first + in_run), numbers_.nameOf(node), kOtherGrid));
-      if (!isAt(placeInCell(brick.positions[n], brick.cell), valueRecordPlace(record)))
+      const RecordedSplat found = valueRecordSplat(record);
+      if (!isAt(placeInCell(brick.positions[n], brick.cell), found.place))
         refuse(position,
-               fmt::format("{} has another position in the grid; {}", numbers_.nameOf(node), kOtherPlace));
+               fmt::format("{} has another position in the grid; {}", numbers_.nameOf(node), kOtherSplat));
+      if (!isAlike(axisCodes(brick.splats[n]), found.axes))
+        refuse(position, fmt::format("{} has a cell of another shape in the grid; {}", numbers_.nameOf(node),
+                                     kOtherSplat));
       unpackValueRecord(record, values);
       for (size_t v = 0; v < variables_; ++v) brick.variables[v][n] = values[v];
     }

@@ -1,6 +1,7 @@
 #include "preprocess/addition/value_buckets.h"
 
 #include <algorithm>
+#include <bit>
 #include <memory>
 #include <utility>
 
@@ -86,7 +87,19 @@ uint32_t ConversionOrder::leafOf(const RootPosition& position, uint64_t node) co
   return brick;
 }
 
-void packValueRecord(uint64_t node, uint32_t brick, const std::array<uint32_t, 3>& place,
+std::array<uint32_t, 3> axisCodes(const Splat& splat) {
+  // A float's exponent and the highest three bits of its fraction, from 2^-64 on.
+  constexpr int kFractionBits = 23 - 3, kLeast = (127 - 64) << 3, kMost = (1 << kPlaceBits) - 1;
+  std::array<uint32_t, 3> codes;
+  for (size_t axis = 0; axis < codes.size(); ++axis) {
+    const auto bits = std::bit_cast<uint32_t>(recordFloat(splat.axis[axis]));
+    codes[axis] =
+        static_cast<uint32_t>(std::clamp(static_cast<int>(bits >> kFractionBits) - kLeast, 0, kMost));
+  }
+  return codes;
+}
+
+void packValueRecord(uint64_t node, uint32_t brick, const RecordedSplat& splat,
                      std::span<const SplatScalar> values, std::vector<std::byte>& out) {
   CURVISPLAT_CHECK_OP(node, <, kMaxNodes);
   const bool varied = std::any_of(values.begin(), values.end(),
@@ -100,8 +113,10 @@ void packValueRecord(uint64_t node, uint32_t brick, const std::array<uint32_t, 3
   };
   put(node | uint64_t{varied} << 47, 6);
   put(brick, sizeof brick);
-  const uint32_t bits = place[0] | place[1] << kPlaceBits | place[2] << (2 * kPlaceBits);
-  put(bits, sizeof bits);
+  for (const std::array<uint32_t, 3>& codes : {splat.place, splat.axes}) {
+    const uint32_t bits = codes[0] | codes[1] << kPlaceBits | codes[2] << (2 * kPlaceBits);
+    put(bits, sizeof bits);
+  }
   for (const SplatScalar& value : values) {
     const float numbers[] = {recordFloat(value.mean), recordFloat(value.slope.x), recordFloat(value.slope.y),
                              recordFloat(value.slope.z)};
@@ -115,7 +130,7 @@ void packValueRecord(uint64_t node, uint32_t brick, const std::array<uint32_t, 3
 }
 
 void unpackValueRecord(const std::byte* record, std::span<SplatScalar> values) {
-  const std::byte* at = record + 14;
+  const std::byte* at = record + minValueRecordBytes(0);
   const auto take = [&at] {
     float single;
     std::memcpy(&single, at, sizeof single);
@@ -185,8 +200,9 @@ void ValueSink::add(const NodeSplat& splat, std::span<const SplatScalar> values)
     leaf_shares_ = order_->sharesItsCell(leaf);
   }
   if (gathered_.size() + maxValueRecordBytes(values.size()) > kGatheredBytes) flush();
-  packValueRecord(splat.node, order_->positionOf(leaf_), placeInCell(position, cache_->bricks()[leaf_].cell),
-                  values, gathered_);
+  packValueRecord(splat.node, order_->positionOf(leaf_),
+                  {placeInCell(position, cache_->bricks()[leaf_].cell), axisCodes(splat.splat)}, values,
+                  gathered_);
   sample_.add(splat.node, splat.splat.weight, values);
 }
 

@@ -2,16 +2,17 @@
 // to the leaf brick that has its splat (ConversionOrder) through buckets of bricks, which fit in memory
 // with their geometry (ValueBuckets; ValueSink writes them, ValueLoader reads them).
 //
-// A record takes 14 + 16 v bytes for v variables, not aligned, in the machine's own byte order:
+// A record takes 18 + 16 v bytes for v variables, not aligned, in the machine's own byte order:
 //
 //    0   node number: 47 bits, and bit 47 says "with variances"     48 bits
 //    6   place of the leaf brick, in the order of conversion         32 bits
 //   10   where in the brick's cell: 10 bits an axis, x lowest        32 bits
-//   14   mean w0 w1 w2                                               4 x float a variable
+//   14   how long a0 a1 a2 are: 10 bits an axis, a0 lowest           32 bits
+//   18   mean w0 w1 w2                                               4 x float a variable
 //        with variances: variance                                    1 x float a variable
 //
 // Records begin with the node as those of splat_record.h do, so that sortByNode() serves both. Values are
-// rounded as they are there. Unlike in conversion, what each brick will get is known from the start, so no
+// rounded as they are there. Places and lengths tell whether the cache has the same splats. Unlike in conversion, what each brick will get is known from the start, so no
 // bucket turns out too large.
 #pragma once
 
@@ -82,7 +83,7 @@ class ConversionOrder {
 inline constexpr int kPlaceBits = 10;
 
 inline constexpr size_t minValueRecordBytes(size_t variables) {
-  return 14 + 16 * variables;
+  return 18 + 16 * variables;
 }
 inline constexpr size_t maxValueRecordBytes(size_t variables) {
   return minValueRecordBytes(variables) + 4 * variables;
@@ -98,8 +99,16 @@ inline std::array<uint32_t, 3> placeInCell(const RootPosition& position, const C
   return place;
 }
 
+/// The codes of a splat's axes, in eighths of a power of two: a code more is a length 1/16 to 1/8 larger.
+std::array<uint32_t, 3> axisCodes(const Splat& splat);
+
+/// A splat as records know it: where it lies in its brick's cell, and how long its axes are.
+struct RecordedSplat {
+  std::array<uint32_t, 3> place, axes;  // placeInCell(), axisCodes()
+};
+
 /// Appends a record.
-void packValueRecord(uint64_t node, uint32_t brick, const std::array<uint32_t, 3>& place,
+void packValueRecord(uint64_t node, uint32_t brick, const RecordedSplat& splat,
                      std::span<const SplatScalar> values, std::vector<std::byte>& out);
 
 inline uint32_t valueRecordBrick(const std::byte* record) {
@@ -107,11 +116,14 @@ inline uint32_t valueRecordBrick(const std::byte* record) {
   std::memcpy(&brick, record + 6, sizeof brick);
   return brick;
 }
-inline std::array<uint32_t, 3> valueRecordPlace(const std::byte* record) {
-  uint32_t bits = 0;
-  std::memcpy(&bits, record + 10, sizeof bits);
-  constexpr uint32_t kMask = (1u << kPlaceBits) - 1;
-  return {bits & kMask, bits >> kPlaceBits & kMask, bits >> (2 * kPlaceBits) & kMask};
+inline RecordedSplat valueRecordSplat(const std::byte* record) {
+  const auto codesAt = [&](size_t offset) -> std::array<uint32_t, 3> {
+    uint32_t bits = 0;
+    std::memcpy(&bits, record + offset, sizeof bits);
+    constexpr uint32_t kMask = (1u << kPlaceBits) - 1;
+    return {bits & kMask, bits >> kPlaceBits & kMask, bits >> (2 * kPlaceBits) & kMask};
+  };
+  return {codesAt(10), codesAt(14)};
 }
 inline size_t valueRecordBytes(const std::byte* record, size_t variables) {
   return recordIsIrregular(record) ? maxValueRecordBytes(variables) : minValueRecordBytes(variables);

@@ -160,7 +160,8 @@ class RangeOfCells {
 };
 
 /// Sets the bodies of cells [begin, end).
-void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<CellBody> out) {
+void setBodies(const FlattenedCells& measured, size_t begin, size_t end, std::span<CellBody> out) {
+  const GatheredCells& cells = measured.cells();
   for (size_t n = begin; n < end;) {
     if (cells.areFourAlike(n, end, 0)) {
       setBodiesOfFour(cells.viewsOfFour(n, 0), out.subspan(n, kCellsAtOnce));
@@ -172,12 +173,18 @@ void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<C
   }
   for (size_t n = begin; n < end; ++n)
     if (const double volume = cells.volumeOf(n); volume > 0 && out[n].volume > 0) out[n].volume = volume;
+  for (size_t n = begin; n < end && measured.flattened(); ++n)
+    if (cells.shapes[n] != CellKind::kNone) out[n] = inSpace(out[n], measured.frame(n));
 }
 
 }  // namespace
 
-CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch)
-    : cells_(cells), fields_(fields), range_cells_(sharesOf(cells, fields, memory_bytes).range_cells) {
+CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch,
+                       CellSpace space)
+    : cells_(cells),
+      fields_(fields),
+      range_cells_(sharesOf(cells, fields, memory_bytes).range_cells),
+      space_(space) {
   const Shares shares = sharesOf(cells, fields, memory_bytes);
   const RecordBytes records = recordBytes(fields);
   const uint64_t ranges = std::max<uint64_t>(1, (cells + range_cells_ - 1) / range_cells_);
@@ -209,11 +216,12 @@ CellSlopes::~CellSlopes() = default;
 
 void CellSlopes::add(const GatheredCells& cells) {
   of_cells_.resize(cells.size());
-  parallelInvoke([&] { list_.assign(cells); },
+  measured_.assign(cells, space_, FlattenedCells::Volumes::kKept);
+  parallelInvoke([&] { list_.assign(measured_.cells()); },
                  [&] {
                    parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
                                [&](const tbb::blocked_range<size_t>& part) {
-                                 setBodies(cells, part.begin(), part.end(), of_cells_);
+                                 setBodies(measured_, part.begin(), part.end(), of_cells_);
                                });
                  });
   parallelInvoke([&] { addFaces(cells); }, [&] { addBodies(cells); });
@@ -237,7 +245,7 @@ void CellSlopes::addFaces(const GatheredCells& cells) {
   faces_->add(
       list_.corners,
       {[&](size_t n, std::span<std::byte> to) {
-         const HalfFace face = list_.face(cells, n);
+         const HalfFace face = measured_.inSpace(list_.face(measured_.cells(), n));
          put(to.data(),
              FaceRecord{cells.numbers[face.cell], of_cells_[face.cell].centre, face.inward, face.centre},
              valuesOf(cells, face.cell));
@@ -301,8 +309,14 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, SlabCells slabs
       cells.values(n, own);
       cells.neighbours(n, steps, others);
       if (!(body.body.volume > 0)) ++flat;
+      if (space_ == CellSpace::kSphere) {
+        const SphereFrame here(body.body.centre);
+        for (glm::dvec3& step : steps) step = here.flat(body.body.centre + step) - body.body.centre;
+      }
       splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
-      const std::span<const OuterPlane> faces = planes.of(body.cell, of_border);
+      planes.of(body.cell, of_border);
+      if (space_ == CellSpace::kSphere) flattenAt(splat.splat.position, of_border);
+      const std::span<const OuterPlane> faces = of_border;
       ++made;
       if (slabs == SlabCells::kHalved && halveSlab(faces, splat, values, halves)) {
         ++cut;
@@ -327,6 +341,7 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, SlabCells slabs
 
 PointSums::Counts CellSlopes::finish(const TakeSplat& take, SlabCells slabs, const Progress& progress) {
   list_ = {};
+  measured_ = {};
   freeMemory(of_cells_);
   bodies_->close();
   const auto join = [&](std::span<const std::byte> first, std::span<const std::byte> second) {

@@ -256,6 +256,33 @@ TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
   expectSays(refusal(source, adding(folder / "older.splats", {1})), "another position");
 }
 
+TEST(AddScalar, RefusesCachesWhoseSplatsHadOtherShapes) {
+  // Layers of 1 cm around a cylinder, closed along i. Before kDualCells the nodes at the seam were as thick as the sagitta of a
+  // cell; they lay where they lie today.
+  const GridBlock block = gridBlock(25, 9, 9);
+  const FunctionGridSource source({block}, 2, [&](const GridNode& node) {
+    const double angle = 2 * std::numbers::pi * static_cast<double>(node.i % (block.ni - 1)) /
+                         static_cast<double>(block.ni - 1);
+    const double radius = 10 + 0.01 * static_cast<double>(node.j);
+    const auto f = static_cast<float>(node.j);
+    return NodeValues{{radius * std::cos(angle), radius * std::sin(angle), static_cast<double>(node.k)},
+                      {f, f}};
+  });
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  convertTo(cache, source, {0});
+  added(source, adding(cache, {1}));
+  const Files files = allFilesOf(cache);
+  EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));
+
+  convertTo(folder / "older.splats", source, {0});
+  changeManifest(folder / "older.splats",
+                 [](nlohmann::ordered_json& json) { json["stretch"] = kSteepStretch; });
+  const std::string refused = refusal(source, adding(folder / "older.splats", {1}));
+  expectSays(refused, "cell of another shape");
+  expectSays(refused, "convert again");
+}
+
 TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
   // The added ones have values in some of these nodes, and none in others.
   const auto blanked = [](const GridNode& node, NodeValues values) {

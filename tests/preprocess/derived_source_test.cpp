@@ -42,6 +42,8 @@ class NamedGrid : public FunctionGridSource {
       description_.flow.push_back({"flow", block, mach, 0, 0, 0});
   }
   const GridDescription& description() const override { return description_; }
+  /// Says that coordinates come from single precision.
+  void roundCoordinates() { description_.coordinate_bytes = 4; }
 
  private:
   GridDescription description_;
@@ -252,6 +254,36 @@ TEST(DerivedSource, OfTheGridAloneAreItsIndicesAndVolumes) {
     EXPECT_EQ(values("k", n), n / 20);
     EXPECT_FLOAT_EQ(values("jacobian", n), -3);
     EXPECT_FLOAT_EQ(values("volume", n), 3);
+  }
+}
+
+TEST(DerivedSource, GradientsAtPolesIgnoreWhatRoundingSetsApart) {
+  // Shells around a point, up to both poles, where the nodes of a row are 1e-16 or 1e-8 apart. The pressure is z, but at the poles it
+  // differs by 0.001 from one longitude to the next.
+  constexpr uint64_t kAround = 9, kUp = 7, kShells = 5;
+  for (const bool single : {false, true}) {
+    auto grid = std::make_unique<NamedGrid>(
+        std::vector{gridBlock(kAround, kUp, kShells)}, std::vector<std::string>{"Density", "Pressure"},
+        [&](const GridNode& node) {
+          const double pi = single ? static_cast<float>(M_PI) : M_PI;
+          const double east = 2 * pi * static_cast<double>(node.i) / (kAround - 1),
+                       north = pi * (static_cast<double>(node.j) / (kUp - 1) - 0.5);
+          const double r = 1 + 0.1 * static_cast<double>(node.k);
+          glm::dvec3 x = r * glm::dvec3(std::cos(north) * std::cos(east), std::cos(north) * std::sin(east),
+                                        std::sin(north));
+          if (single) x = glm::dvec3(glm::vec3(x));
+          const bool pole = node.j == 0 || node.j + 1 == kUp;
+          const double noise = pole ? 0.001 * static_cast<double>(node.i % 3) : 0.0;
+          return NodeValues{x, {1, static_cast<float>(3 + x.z + noise)}, false};
+        });
+    if (single) grid->roundCoordinates();
+    const DerivedSource source(std::move(grid), options());
+    const Values values = valuesOf(source, {"pressure_gradient_magnitude"});
+    for (uint64_t k = 0; k < kShells; ++k)
+      for (const uint64_t j : {uint64_t{0}, kUp - 1})
+        for (uint64_t i = 0; i < kAround; ++i)
+          EXPECT_NEAR(values("pressure_gradient_magnitude", (k * kUp + j) * kAround + i), 1, 0.005)
+              << single << ", " << i << " " << j << " " << k;
   }
 }
 

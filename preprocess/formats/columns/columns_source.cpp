@@ -272,12 +272,12 @@ void ColumnsSource::noteSagitta() {
   });
   const double sagitta = globe_.radius_km * deepest, thickness = globe_.vertical_scale * thinnestLayer();
   if (!(thickness > 0 && 2 * sagitta > thickness)) return;
-  description_.warnings.push_back(
-      fmt::format("cells are flat, and their middles lie up to {:.3g} km below the sphere, {:.3g} times the "
-                  "thickness of the "
-                  "thinnest layer: there splats of one layer lie among those of others, and values mix; "
-                  "--flat keeps layers apart",
-                  sagitta, sagitta / thickness));
+  description_.warnings.push_back(fmt::format(
+      "cells are flat, and their middles lie up to {:.3g} km below the sphere, {:.3g} times the "
+      "thickness of the "
+      "thinnest layer: there splats of one layer cross those of others, and an opaque picture shows deeper "
+      "ones; --flat keeps layers apart",
+      sagitta, sagitta / thickness));
 }
 
 std::vector<double> ColumnsSource::readAngles(const NetcdfVariable& variable, uint64_t first,

@@ -1,6 +1,7 @@
 #include "preprocess/formats/derived/flow_window.h"
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -266,12 +267,21 @@ std::pair<size_t, size_t> FlowWindow::neighbours(size_t n, int axis, uint64_t in
   return {before ? n - stride : n, after ? n + stride : n};
 }
 
+glm::dvec3 FlowWindow::stepBetween(size_t before, size_t after) const {
+  constexpr double kRoundings = 4;
+  const double digit = source_.description().coordinate_bytes == 4 ? std::numeric_limits<float>::epsilon()
+                                                                   : std::numeric_limits<double>::epsilon();
+  const glm::dvec3 here = position(before), step = position(after) - here, size = glm::abs(here);
+  const double most = std::max({size.x, size.y, size.z});
+  return glm::length(step) > kRoundings * digit * most ? step : glm::dvec3(0.0);
+}
+
 glm::dmat3 FlowWindow::velocityGradient(size_t n, const std::array<uint64_t, 3>& index) const {
   glm::dmat3 steps, differences;  // columns: along the axes
   for (int axis = 0; axis < 3; ++axis) {
     const auto [before, after] = neighbours(
         n, axis, index[axis], [&](size_t at) { return present_[at] && isFinite(flow_[at].velocity); });
-    steps[axis] = position(after) - position(before);
+    steps[axis] = stepBetween(before, after);
     differences[axis] = flow_[after].velocity - flow_[before].velocity;
   }
   const LatticeGradient gradient(steps);
@@ -287,7 +297,7 @@ glm::dvec3 FlowWindow::pressureGradient(size_t n, const std::array<uint64_t, 3>&
   for (int axis = 0; axis < 3; ++axis) {
     const auto [before, after] = neighbours(
         n, axis, index[axis], [&](size_t at) { return present_[at] && std::isfinite(flow_[at].pressure); });
-    steps[axis] = position(after) - position(before);
+    steps[axis] = stepBetween(before, after);
     differences[axis] = flow_[after].pressure - flow_[before].pressure;
   }
   return LatticeGradient(steps)(differences);
