@@ -355,7 +355,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   constexpr std::pair<Command, const char*> kSides[]{
       {Command::kLookPlusX, "+x"},     {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
       {Command::kLookMinusY, "-y"},    {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
-      {Command::kLookIsometric, "iso"}};
+      {Command::kLookIsometric, "Iso"}};
   label("look from");
   for (const auto& [command, text] : kSides) {
     commandButton(command, actions, text);

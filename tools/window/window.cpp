@@ -15,6 +15,7 @@
 
 #include "render/gl/gl_context.h"
 #include "stream/base/error.h"
+#include "tools/window/keyboard_focus.h"
 #include "tools/window/theme.h"
 #include "tools/window/widgets.h"
 
@@ -211,7 +212,7 @@ void Window::showInput() {
   shown_mouse_ = {io.MousePos.x, io.MousePos.y};
 }
 
-/// What is dragged ends where the button was released: a slow frame may not have shown the mouse there before.
+/// A drag ends where the button was released: a slow frame may not have shown the mouse there before.
 void Window::showButton() {
   const Event event = events_.front();
   ImGui::GetIO().MousePos = {static_cast<float>(event.at.x), static_cast<float>(event.at.y)};
@@ -254,6 +255,7 @@ void Window::beginFrame() {
   ImGui_ImplGlfw_NewFrame();
   showInput();
   ImGui::NewFrame();
+  keyboardFocus().beginFrame(shown_keys_);
 }
 
 void Window::coverCurrent() {
@@ -333,6 +335,8 @@ std::vector<Window::Key> Window::takeKeys() {
     return std::string_view("ACVXYZ").find(static_cast<char>(key.code)) != std::string_view::npos;
   };
   if (ImGui::GetIO().WantTextInput) std::erase_if(keys, edits);
+  if (keyboardFocus().isShown())
+    std::erase_if(keys, [](const Key& key) { return key.code == GLFW_KEY_SPACE; });
   return keys;
 }
 
