@@ -188,7 +188,8 @@ std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const F
   const IsoLayers::Look look{planner_.colours(),
                              options.light,
                              {opacity.factor, opacity.by_function ? input.opacities : nullptr, of_colours},
-                             coloured_by_ && !of_colours};
+                             coloured_by_ && !of_colours,
+                             options.scene->iso_colours};
   IsoLayers layers(settings.view.size);
   statistics.iso_bricks = bricksOf(plan.iso_parts).size();
   std::vector<TileRange> left{{0, layers.tiles()}};

@@ -290,7 +290,7 @@ SurfaceScene FaceMeshes::withMeshes(const std::shared_ptr<const SurfaceScene>& s
       kept_[n].chosen = std::move(chosen);
     }
     drawn.surfaces.push_back({kept_[n].mesh, surface.colour, surface.scalar.has_value(), surface.colours,
-                              surface.opacity, surface.map});
+                              surface.opacity, surface.map, surface.own_colour});
   }
   return drawn;
 }

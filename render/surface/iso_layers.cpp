@@ -275,8 +275,10 @@ class IsoLayers::Tracer {
     const glm::dvec3 n(hit.gradient);
     // A gradient: in data coordinates it is larger where they are stretched.
     const glm::dvec3 of_data = view_.scale * (n.x * view_.right + n.y * view_.down + n.z * view_.forward);
-    return light_.lit(look_.colours.at(double{look_.colours_of_other ? hit.other_scalar : hit.scalar}),
-                      glm::vec3(of_data), towardsViewer(view_, x, y));
+    const std::optional<glm::vec3> own =
+        look_.own_colours.empty() ? std::nullopt : look_.own_colours[hit.surface];
+    const double scalar{look_.colours_of_other ? hit.other_scalar : hit.scalar};
+    return light_.lit(own ? *own : look_.colours.at(scalar), glm::vec3(of_data), towardsViewer(view_, x, y));
   }
 
   IsoPacket emptyPacket() const {

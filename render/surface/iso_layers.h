@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <span>
 #include <vector>
@@ -20,7 +21,8 @@ class IsoLayers {
     const ColourTable& colours;
     std::optional<Light> light;  // none: a light at the viewer
     IsoOpacity opacity = {};
-    bool colours_of_other = false;  // of the other scalar
+    bool colours_of_other = false;                               // of the other scalar
+    std::span<const std::optional<glm::vec3>> own_colours = {};  // SurfaceScene::iso_colours
   };
   explicit IsoLayers(ImageSize size);
 

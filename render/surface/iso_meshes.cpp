@@ -96,7 +96,9 @@ IsoSurfaces isoSurfaces(const IsoMeshes::Meshes& meshes, const SurfaceScene& sce
     Surface surface;
     surface.mesh = meshes[n];
     surface.by_scalar = two_scalars && !of_colours;
-    if (!surface.by_scalar) surface.colour = colours.at(value);
+    const std::optional<glm::vec3> own = scene.isoColour(n);
+    surface.own_colour = own.has_value();
+    if (own || !surface.by_scalar) surface.colour = own ? *own : colours.at(value);
     surface.opacity = {opacity.factor, opacity.by_function && of_colours};
     if (opacity.by_function && !of_colours && opacities)
       surface.opacity.factor *= double{opacities->opacityAt(value)};

@@ -220,7 +220,8 @@ void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned
            {depth,
             {slopes.x[ray], slopes.y[ray], slopes.z[ray]},
             scalar,
-            settings_.two_scalars ? otherAt(ray, z[ray], at) : scalar},
+            settings_.two_scalars ? otherAt(ray, z[ray], at) : scalar,
+            static_cast<uint32_t>(value)},
            packet.opacity);
   }
 }

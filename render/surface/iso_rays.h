@@ -30,6 +30,7 @@ struct IsoHit {
   glm::vec3 gradient;  // in view axes, of a stretched unit
   float scalar;        // the isovalue
   float other_scalar;  // that of the picture's other scalar; of one scalar, the same
+  uint32_t surface;    // its place among the isovalues
 };
 
 /// The opacity of crossings. Those that are nearly clear are not there.

@@ -43,6 +43,7 @@ struct Surface {
   SheetOpacity opacity = {};  // by_function: where `by_scalar`, or the mesh has opacity_scalars
   // The image replaces `colour`; the picture's light alone lights it (render/surface/map_image.h).
   std::shared_ptr<const PlacedMap> map = nullptr;
+  bool own_colour = false;  // `colour`, also by_scalar: the scalars are values of pixels alone
 };
 
 /// Faces of the grid from its cache, drawn as a Surface at a level of detail that depends on the view.
@@ -66,6 +67,7 @@ struct GridSurface {
   std::optional<size_t> opacity_scalar = std::nullopt;
   std::string opacity_name = {};                   // in the cache
   std::shared_ptr<const PlacedMap> map = nullptr;  // as Surface, where it has no scalar
+  bool own_colour = false;                         // as Surface
 
   /// Takes what does not change the mesh: colours and opacities' factors.
   void takeLookOf(const GridSurface& other) {
@@ -74,6 +76,7 @@ struct GridSurface {
     function = other.function;
     opacity = other.opacity;
     map = other.map;
+    own_colour = other.own_colour;
   }
   /// Whether the same patches make the same mesh.
   bool hasMeshOf(const GridSurface& other) const {
@@ -110,10 +113,15 @@ struct SurfaceScene {
   bool slices_by_function = false;  // times the function's opacity; of two scalars, of that of the opacities
   std::vector<double> isovalues;    // of the picture's scalar; of two, of that of the opacities
   bool iso_of_colours = false;      // of two scalars: of that of the colours
-  SheetOpacity iso_opacity = {};    // by_function: the picture's opacities
-  bool volume = true;               // false: what else there is alone
+  std::vector<std::optional<glm::vec3>> iso_colours = {};  // as `isovalues`, or empty; none: the function's
+  SheetOpacity iso_opacity = {};                           // by_function: the picture's opacities
+  bool volume = true;                                      // false: what else there is alone
   std::vector<Curves> curves = {};
 
+  /// The colour that an isosurface has of its own, if it has one.
+  std::optional<glm::vec3> isoColour(size_t n) const {
+    return iso_colours.empty() ? std::nullopt : iso_colours.at(n);
+  }
   /// Whether it has nothing that makes layers.
   bool empty() const {
     return surfaces.empty() && grid_surfaces.empty() && slices.empty() && isovalues.empty() && curves.empty();

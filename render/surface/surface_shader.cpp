@@ -193,7 +193,7 @@ void SurfaceShader::shadeTriangles(std::span<const Spot> spots, std::span<Point>
     const float scalar = mixed.scalar[n];
     point.scalar = isovalueOf(number);
     if (!std::isnan(point.scalar) && !std::isnan(scalar)) point.scalar = scalar;
-    point.colour = std::isnan(scalar) ? surface.colour : colours.at(double{scalar});
+    point.colour = std::isnan(scalar) || surface.own_colour ? surface.colour : colours.at(double{scalar});
     if (surface.map && std::isnan(scalar)) shadeMap(spots[n], *surface.map, point);
     if (!surface.opacity.by_function) continue;
     const bool has_other = !surface.mesh->opacity_scalars.empty() && tables_.opacities;

@@ -257,11 +257,46 @@ TEST_F(Isosurfaces, TheProgramDrawsThemAndRefusesWrongUsage) {
   } refused[] = {{{"--iso", "7"}, 1, "--iso 7: no isosurface: the values of f go from "},
                  {{"--iso", "x"}, 2, "--iso"},
                  {{"--iso-opacity", "0.5"}, 2, "--iso-opacity needs an isosurface: --iso VALUE"},
-                 {{"--iso", "0.5", "--iso-opacity", "2"}, 2, "--iso-opacity 2: expected a number above 0"}};
+                 {{"--iso", "0.5", "--iso-opacity", "2"}, 2, "--iso-opacity 2: expected a number above 0"},
+                 {{"--iso-colour", "#ff0000"}, 2, "--iso-colour needs an isosurface: --iso VALUE"},
+                 {{"--iso", "0.5", "--iso-colour", "red"}, 2, "--iso-colour"},
+                 {{"--iso", "0.5", "--iso-colour", "transparent"}, 2, "give #rrggbb, and --iso-opacity"},
+                 {{"--iso", "0.4,0.5,0.6", "--iso-colour", "#ff0000,function"},
+                  2,
+                  "--iso-colour: has 2 colours for 3 isosurfaces"}};
   for (const auto& [options, status, words] : refused) {
     const ProgramResult result = runProgram(render(options));
     EXPECT_EQ(result.status, status) << result.err;
     expectSays(result.err, words);
+  }
+}
+
+/// A surface with a colour c is lit to factor c + white in each channel, clamped at 1: grey and red pictures have the same factor and
+/// white. Both in the cells of a grid and in the field of splats, and where another scalar has the colours.
+TEST_F(Isosurfaces, HaveColoursOfTheirOwn) {
+  constexpr float kGrey = 0.4f;  // #666666, which the map "grey" has at 0.4
+  const auto draw = [&](const std::string& cache, const Words& more) {
+    run(Words{"render", file(cache), "-o", file("a.pfm"), "--size", "100x100", "--view", "iso",
+              "--background", "#000000", "--volume", "off", "--iso", "0.4", "--no-scalar-bar"} +
+        more);
+    return readImage(file("a.pfm"));
+  };
+  const Words grey{"--scalar", "f", "--tf", "grey", "--range", "0,1"};
+  for (const std::string cache : {"a.splats", "cells.splats"}) {
+    const Image by_function = draw(cache, grey), own = draw(cache, grey + Words{"--iso-colour", "#666666"});
+    const Image red = draw(cache, grey + Words{"--iso-colour", "#ff0000"});
+    size_t seen = 0;
+    for (size_t n = 0; n < own.rgba.size(); n += 4) {
+      for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(by_function.rgba[n + c], own.rgba[n + c], 1e-3f) << cache;
+      const float white = red.rgba[n + 1];
+      EXPECT_EQ(white, red.rgba[n + 2]);
+      // Pixels at outlines are means of several rays, whose whites and factors are clamped one by one.
+      if (red.rgba[n] >= 1) continue;
+      EXPECT_NEAR((own.rgba[n] - white) / kGrey, red.rgba[n] - white, 2e-3f) << cache;
+      seen += red.rgba[n] > 0.2f;
+    }
+    EXPECT_GT(seen, 300u) << cache;
+    EXPECT_EQ(draw(cache, grey + Words{"--iso-colour", "function"}).rgba, by_function.rgba);
   }
 }
 

@@ -195,6 +195,32 @@ TEST_F(WindowPanels, APlaneIsTurnedInThePictureAndByNumbers) {
   expectDraws(commands[2], typed);
 }
 
+/// A grip stands out from any picture: it has a dark ring and a light one.
+TEST_F(WindowPanels, GripsHaveADarkAndALightRing) {
+  open();
+  choose("Picture", "Add a clip plane");
+  press("x");
+  save();
+  for (const bool is_light : {false, true}) {
+    if (is_light) press("b");
+    save();
+    const auto [left, top] = placeOf("handle 1", 0, 0);
+    const auto [right, bottom] = placeOf("handle 1", 1, 1);
+    const Image screen = display_->screenshot();
+    // From the middle outwards, to the left of the line to the tip and of the frame.
+    float darkest = 1, lightest = 0;
+    for (int n = 0; n <= (right - left) / 2 + 3; ++n) {
+      const float* const pixel =
+          screen.pixel((left + right) / 2 - n * 7 / 10, (top + bottom) / 2 - n * 7 / 10);
+      darkest = std::min(darkest, std::max({pixel[0], pixel[1], pixel[2]}));
+      lightest = std::max(lightest, std::min({pixel[0], pixel[1], pixel[2]}));
+    }
+    EXPECT_LT(darkest, 0.3f) << is_light;
+    EXPECT_GT(lightest, 0.7f) << is_light;
+  }
+  close();
+}
+
 /// The name of an axis in the picture is pressed: the view is that of the key, and then that from the other side.
 TEST_F(WindowPanels, AxesAreLookedAlongByAClick) {
   open();

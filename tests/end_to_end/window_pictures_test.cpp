@@ -44,13 +44,28 @@ class WindowPictures : public WindowTest {
   }
 };
 
+/// A large window's isosurface takes more than the usual memory, which it gets; a limit that was given stays.
+TEST_F(WindowPictures, GetTheMemoryThatTheyNeed) {
+  constexpr ImageSize kLarge{3200, 1800};
+  display_.emplace(kLarge);
+  open({"--iso", "0.5"}, kLarge);
+  const Image drawn = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_NE(valueOf(commands[0], "--memory"), "");
+  expectDraws(commands[0], drawn);
+  open({"--iso", "0.5", "--memory", "512M"}, kLarge);
+  EXPECT_TRUE(eventually([] { return hasWidget("message this picture needs"); }));
+  close();
+}
+
 /// The same as the command draws in that size.
 TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   open();
   saveAndCopy();
   const ImageSize shown = pictureSize();
   openDialog("twice.png");
-  clickUntil("picture size twice that",
+  clickUntil("picture size Twice that",
              [&] { return hasWidget(fmt::format("picture of {} x {}", 2 * shown.width, 2 * shown.height)); });
   const Image twice = accept("twice.png");
   EXPECT_EQ(twice.size.width, 2 * shown.width);
@@ -385,7 +400,7 @@ TEST_F(WindowMovie, OneThatIsStoppedLeavesNothing) {
   open();
   saveMovie("Save film: once around...", "movie/m.mp4");
   click("stop movie");
-  EXPECT_TRUE(eventually([] { return hasWidget("message Stopped. The movie was not saved."); }));
+  EXPECT_TRUE(eventually([] { return hasWidget("message Stopped. The film was not saved."); }));
   EXPECT_EQ(filesIn("movie"), 0u);
   save();  // the window goes on
   close();

@@ -67,6 +67,47 @@ TEST_F(WindowSurfaces, FacesOfTheGridAreAddedColouredUndoneAndRemoved) {
   expectDraws(commands[3], by_function);
 }
 
+/// The mouse over a face in a list tints it in the picture; the view, its command and its undo know nothing of it.
+TEST_F(WindowSurfaces, FacesUnderTheMouseAreTinted) {
+  openObjects({}, kScreen);
+  choose("Picture", "Lighting");
+  const Image lit = saveAndCopy();
+  unfold("Surfaces", "add surface");
+  const auto orange = [&] {
+    const Image picture = shown(pictureSize());
+    size_t pixels = 0;
+    for (size_t n = 0; n < picture.rgba.size(); n += 4)
+      pixels +=
+          picture.rgba[n] > picture.rgba[n + 1] + 0.15f && picture.rgba[n + 1] > picture.rgba[n + 2] + 0.1f;
+    return pixels;
+  };
+  const size_t before = orange();
+  click("add surface");
+  moveTo(placeOf("add surface kmin"));
+  EXPECT_TRUE(eventually([&] { return orange() > before + 2000; }));
+  press("Escape");
+  moveTo(rest_);
+  EXPECT_TRUE(eventually([&] { return orange() == before; }));
+  EXPECT_GE(difference(saveAndCopy(), lit), 60);
+  press("ctrl+z");  // the lighting, and nothing since
+  EXPECT_LT(difference(save(), lit), 45);
+  press("ctrl+y");
+  addFaces("kmin");
+  placeOf("remove surface 1");
+  click("surfaces by");
+  click("surfaces by volume");  // the tint is seen all the same
+  moveTo(rest_);
+  save();
+  const size_t coloured = orange();
+  moveTo(placeOf("opacity of surface 1"));
+  EXPECT_TRUE(eventually([&] { return orange() > coloured + 2000; }));
+  moveTo(rest_);
+  EXPECT_TRUE(eventually([&] { return orange() == coloured; }));
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_EQ(commands[0], commands[1]);
+}
+
 /// Surfaces are there again in the next window, without the volume that was switched off.
 TEST_F(WindowSurfaces, AreRemembered) {
   openObjects();
@@ -144,6 +185,34 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
   EXPECT_EQ(valueOf(commands[4], "--iso-by"), "");
   const Image* const pictures[] = {&middle, &higher, &without, &alone, &of_volume};
   for (size_t n = 0; n < 5; ++n) expectDraws(commands[n], *pictures[n]);
+}
+
+/// An isosurface keeps its own colour when the function's change; the copied command has it, and it is undone.
+TEST_F(WindowSurfaces, AnIsosurfaceHasAColourOfItsOwn) {
+  openObjects({"--iso", "0.5", "--volume", "off"}, kScreen);
+  const Image by_function = saveAndCopy();
+  click("isosurface 1 by colours");  // it keeps the colour that it has
+  EXPECT_GE(difference(saveAndCopy(), by_function), 45);
+  click("colour of isosurface 1");
+  const Place swatch = placeOf("colour of isosurface 1", 0, 1);
+  click(Place{swatch.first + 30, swatch.second + 30});  // light and pale, in the square below the swatch
+  press("Escape");
+  moveTo(rest_);
+  const Image own = saveAndCopy();
+  EXPECT_LT(difference(own, by_function), 45);
+  tab("Colour");
+  click("colours");
+  click("colours viridis");
+  moveTo(rest_);
+  EXPECT_GE(difference(save(), own), 50);
+  for (int n = 0; n < 3; ++n) press("ctrl+z");
+  EXPECT_GE(difference(save(), by_function), 50);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 3u);
+  EXPECT_EQ(valueOf(commands[0], "--iso-colour"), "");
+  EXPECT_NE(valueOf(commands[1], "--iso-colour"), "");
+  EXPECT_NE(valueOf(commands[2], "--iso-colour"), valueOf(commands[1], "--iso-colour"));
+  expectDraws(commands[2], own);
 }
 
 /// The volume takes the opacities of a scalar whose isosurface is to be drawn, and gets its own back when that is removed.

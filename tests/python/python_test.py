@@ -129,9 +129,10 @@ class Pictures(PythonTest):
             two, one = (scalar.name for scalar in cache.scalars[:2])
             middle = (cache.scalars[0].min + cache.scalars[0].max) / 2
             self.expect_same(cache.render(one, size=(160, 120), opacity_by=two, opacity_range=(0.1, 0.9), opacity=[(0, 0), (1, 0.7)],
-                                          isovalues=middle, iso_by=two, iso_opacity=0.5, classify="flat"),
+                                          isovalues=middle, iso_by=two, iso_opacity=0.5, iso_colour="#ff8000",
+                                          classify="flat"),
                              "--scalar", one, "--opacity-by", two, "--opacity-range", "0.1,0.9", "--opacity", "0:0,1:0.7", "--iso", repr(middle),
-                             "--iso-by", two, "--iso-opacity", 0.5, "--classify", "flat")
+                             "--iso-by", two, "--iso-opacity", 0.5, "--iso-colour", "#ff8000", "--classify", "flat")
             both = cache.render(one, size=(160, 120), opacity_by=two)
             self.expect_same(both, "--scalar", one, "--opacity-by", two)
             self.expect_same(cache.render(two, size=(160, 120)), "--scalar", two)

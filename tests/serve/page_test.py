@@ -201,8 +201,22 @@ def press(tab, selector):
 def objects(tab):
     """Faces and isosurfaces are added, hidden, moved and removed."""
     before = rest(tab)
-    expect(tab.run("[...document.getElementById('add-face').options].map(o => o.value).includes('jmin')"), "the grid's faces are offered")
-    changes(tab, lambda: set_value(tab, "#add-face", "jmin"), "a face of the grid", "face")
+    kept = tab.run("[statesAtRest.length, location.hash, JSON.stringify(state)]")
+    press(tab, "#add-face")
+    expect(tab.run("[...document.querySelectorAll('#face-names button')].map(o => o.textContent).includes('jmin')"), "the grid's faces are offered")
+    name = "[...document.querySelectorAll('#face-names button')].find(o => o.textContent === 'jmin')"
+    changes(tab, lambda: tab.run(f"{name}.dispatchEvent(new PointerEvent('pointerenter'))"), "pointing at a face's name", "face_pointed")
+    shown = rest(tab)
+    orange = tab.run("""(() => { const c = document.getElementById('picture'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+      let n = 0; for (let k = 0; k < d.length; k += 4) n += d[k] > d[k + 1] + 40 && d[k + 1] > d[k + 2] + 20; return n; })()""")
+    expect(orange > 500, f"the face is tinted: {orange} pixels are orange")
+    changes(tab, lambda: tab.run(f"{name}.dispatchEvent(new PointerEvent('pointerleave'))"), "leaving it")
+    expect(rest(tab) == before != shown, "the picture is the one before")
+    expect(tab.run("[statesAtRest.length, location.hash, JSON.stringify(state)]") == kept, "the view, its address and its undo are those before")
+    changes(tab, lambda: tab.run(f"{name}.click()"), "a face of the grid", "face")
+    expect(tab.run("document.getElementById('face-names').hidden"), "the list closes")
+    changes(tab, lambda: tab.run("document.querySelector('#faces .row').dispatchEvent(new PointerEvent('pointerenter'))"), "pointing at a listed face")
+    changes(tab, lambda: tab.run("document.querySelector('#faces .row').dispatchEvent(new PointerEvent('pointerleave'))"), "leaving it")
     changes(tab, lambda: set_value(tab, "#faces input[type=color]", "#ff0000"), "its colour")
     changes(tab, lambda: set_value(tab, "#faces input[type=range]", "0.3"), "its opacity")
     changes(tab, lambda: press(tab, "#faces .eye"), "its eye")
@@ -224,6 +238,16 @@ def objects(tab):
     set_value(tab, "#isosurfaces input[type=number]", repr(value))
     changes(tab, lambda: set_value(tab, "#isosurfaces input[type=number]", repr(low + 0.3 * (high - low))), "its value")
     changes(tab, lambda: press(tab, "#volume"), "the isosurface alone", "isosurface_alone")
+    colour = "#isosurfaces input[type=color]"
+    shown = rest(tab)
+    of_function = tab.run(f"document.querySelector('{colour}').value")
+    strip_colours = tab.run("strip.match(/.{6}/g)")
+    at = int((tab.run(f"{PAGE}.state.isosurfaces[0].value") - low) / (high - low) * len(strip_colours))
+    expect(of_function == "#" + strip_colours[at], f"its swatch has the function's colour {strip_colours[at]}: {of_function}")
+    changes(tab, lambda: set_value(tab, colour, "#00ff00"), "a colour of its own", "isosurface_green")
+    expect(tab.run(f"{PAGE}.state.isosurfaces[0].colour") == [0, 1, 0], "it is green")
+    set_value(tab, "#isosurfaces input[type=checkbox]", "on")
+    expect(rest(tab) == shown, "it has the function's colour again")
     copied = tab.run(f"{PAGE}.state.isosurfaces")
     expect(len(copied) == 1 and copied[0]["visible"], f"one isosurface: {copied}")
     press(tab, "#volume")
@@ -388,6 +412,92 @@ def sizes(tab):
     shot(tab, "phone")
     expect(tab.run(f"{PAGE}.state.camera.parallel_scale") < 0.9 * turned["parallel_scale"], "two fingers zoom")
     tab.resize(1280, 800, RATIO)
+
+
+def undo_after_resizing(tab):
+    """A window of another size is no step of undo; a view that comes back by undo is for the present size."""
+    rest(tab)
+    camera = tab.run(f"{PAGE}.state.camera")
+    steps = tab.run("[statesAtRest.length, stateAtRest]")
+    outline = tab.run(f"{PAGE}.state.outline")
+    changes(tab, lambda: tab.click("#outline"), "the outline")
+    tab.resize(390, 844, 2)
+    tab.wait(f"{PAGE}.header.width === 780", "the narrow picture")
+    rest(tab)
+    expect(tab.run("[statesAtRest.length, stateAtRest]") == [steps[1] + 2, steps[1] + 1], f"resizing adds no step to undo: {steps}")
+    narrow = tab.run(f"{PAGE}.state.camera.parallel_scale")
+    expect(narrow > 1.2 * camera["parallel_scale"], "the narrow picture's view is further away")
+    tab.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'z', ctrlKey: true }))")
+    rest(tab)
+    expect(tab.run(f"{PAGE}.state.outline") == outline, "Ctrl+Z undoes the outline")
+    expect(abs(tab.run(f"{PAGE}.state.camera.parallel_scale") / narrow - 1) < 0.01, "in the view of the narrow picture")
+    tab.resize(1280, 800, RATIO)
+    tab.wait(f"{PAGE}.header.width > 780 * {RATIO}", "the wide picture")
+    rest(tab)
+    back = tab.run(f"{PAGE}.state.camera")
+    expect(max(abs(a - b) for a, b in zip(back["position"], camera["position"])) < 0.01 * max(map(abs, camera["position"])), "and the view comes back")
+
+
+CONTRASTS = """(() => {
+  const parse = text => { const m = text.match(/[\\d.]+/g).map(Number); return [m[0], m[1], m[2], m.length > 3 ? m[3] : 1]; };
+  const over = (a, b) => [0, 1, 2].map(i => a[3] * a[i] + (1 - a[3]) * b[i]).concat(1);
+  const light = c => { const [r, g, b] = c.slice(0, 3).map(v => v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+  const ratio = (a, b) => { const [low, high] = [light(a), light(b)].sort((x, y) => x - y); return (high + 0.05) / (low + 0.05); };
+  const behind = (e, picture) => { const chain = [];
+    for (; e && e.id !== "stage"; e = e.parentElement) chain.unshift(parse(getComputedStyle(e).backgroundColor));
+    return chain.reduce((below, c) => over(c, below), picture); };
+  const low = [];
+  let count = 0;
+  for (const e of document.querySelectorAll("body *")) {
+    const own = [...e.childNodes].some(n => n.nodeType === 3 && n.data.trim()) || e.matches("select, textarea, input[type=number]");
+    if (!own || !e.getClientRects().length || e.matches("script, style, option")) continue;
+    for (let a = e; a; a = a.parentElement) if (getComputedStyle(a).opacity !== "1") low.push([e.id || e.textContent, "is translucent"]);
+    for (const picture of [[255, 255, 255, 1], [21, 23, 28, 1]]) {
+      const paper = behind(e, picture), found = ratio(over(parse(getComputedStyle(e).color), paper), paper);
+      ++count;
+      if (found < 4.5) low.push([e.id || e.textContent.trim().slice(0, 30), found]);
+    }
+  }
+  const hex = name => { const t = getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim().slice(1);
+    return (t.length === 3 ? [...t].map(c => c + c) : t.match(/../g)).map(c => parseInt(c, 16)); };
+  for (const [a, b, least] of [["numbers", "curve", 4.5], ["numbers", "bars", 4.5], ["accent", "curve", 3], ["accent", "bars", 3], ["point", "curve", 3],
+      ["point", "bars", 3], ["iso", "curve", 3], ["iso", "bars", 3], ["accent", "panel", 3], ["accent", "field", 3]])
+    if (ratio(hex(a), hex(b)) < least) low.push([a + " on " + b, ratio(hex(a), hex(b))]);
+  return [count, low];
+})()"""
+
+
+def themes(browser, server):
+    """Both themes: the system's, or the one that is chosen, which stays. Every text is read on what lies behind it."""
+    tab = opened(browser, server.url)
+    tab.run("localStorage.clear()")
+    for system in ("dark", "light"):
+        tab.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": system}])
+        tab.wait(f"document.documentElement.dataset.theme === '{system}'", "the system's theme")
+    tab.click("#light")
+    expect(tab.run("document.documentElement.dataset.theme") == "dark", "the box chooses the other theme")
+    tab.call("Page.reload")
+    tab.wait(f"{PAGE} && {PAGE}.pictures > 0", "a picture after loading again")
+    expect(tab.run("document.documentElement.dataset.theme") == "dark", "which stays")
+    press(tab, "#add-iso")
+    press(tab, "#add-clip")
+    set_value(tab, "#clip", "on")
+    rest(tab)
+    tab.run("state.markers.push({ name: '1', scalar: 'f', unit: '', value: 1, point: [...cache.upper], block: 0, i: 0, j: 0, k: 0 }); showMarkers()")
+    tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; }); openMaps(true); openFaces(true)")
+    tab.run("say('a message'); $('keys').showModal()")
+    for theme in ("dark", "light"):
+        if tab.run("document.documentElement.dataset.theme") != theme:
+            press(tab, "#light")
+        background = tab.run("getComputedStyle(document.getElementById('panel')).backgroundColor")
+        expect(background == {"dark": "rgb(34, 38, 43)", "light": "rgb(246, 247, 248)"}[theme], f"the {theme} theme's panel: {background}")
+        count, low = tab.run(CONTRASTS)
+        expect(count > 200 and not low, f"contrasts of the {theme} theme, of {count} texts: {low}")
+        shot(tab, f"theme_{theme}")
+    tab.run("localStorage.clear()")
+    tab.call("Emulation.setEmulatedMedia", features=[])
+    tab.call("Page.navigate", url="about:blank")
 
 
 def time_steps(browser, server):
@@ -750,7 +860,10 @@ with tempfile.TemporaryDirectory() as folder:
             flying(tab)
             print("flying done")
             sizes(tab)
+            undo_after_resizing(tab)
             print("sizes done")
+            themes(browser, server)
+            print("themes done")
             shared_address(browser, server, tab)
             print("shared address done")
             time_steps(browser, server)

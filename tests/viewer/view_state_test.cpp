@@ -42,7 +42,7 @@ ViewState changedState() {
   state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25, false}};
   state.faces = {{"block 3:k=min", {0, 1, 0.5f}, {0.5, true}}, {"walls", {0.5f, 0.5f, 0.5f}, {}, false}};
   state.faces_by = FacesScalar{"density", EditedFunction("magma", 0.5, 2, 0.1)};
-  state.isosurfaces = {{"density", 0.25}, {"u v", -0.5, false}};
+  state.isosurfaces = {{"density", 0.25, true, glm::vec3(1, 0.5f, 0)}, {"u v", -0.5, false}};
   state.iso_opacity = {0.75, true};
   state.slices = {{ClipPlane{{0, 0.25, 0}, {0, -1, 2}}, false}};
   state.slice_opacity = {0.5, true};
@@ -170,6 +170,7 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/faces/1/colour", nlohmann::json::array({0, 0, 2}), "faces[1].colour");
   expectError("/faces_by/variable", "pressure", "faces_by.variable");
   expectError("/isosurfaces/1/value", "high", "isosurfaces[1].value");
+  expectError("/isosurfaces/1/colour", nlohmann::json::array({0, 0, 2}), "isosurfaces[1].colour");
   expectError("/slice_opacity", 2, "slice_opacity");
   expectError("/slices_by_function", 2, "slices_by_function");
   expectError("/surfaces/0/opacity", 0, "surfaces[0].opacity");
@@ -307,22 +308,56 @@ TEST(ViewState, DrawsIsosurfacesOfOneScalar) {
   chooseVariable(state, manifest(), "u v");
   state.isosurfaces = {{"density", 1}, {"u v", 0.25}, {"u v", 0.5, false}, {"density", 2}};
   using Values = std::vector<double>;
-  EXPECT_EQ(state.isovalues(), Values{0.25});
+  const auto drawn = [&] {
+    const auto scene = state.frameOptions({3, 2}).scene;
+    return scene ? scene->isovalues : Values{};
+  };
+  EXPECT_EQ(drawn(), Values{0.25});
   state.opacity_by = OpacityScalar{"density", EditedFunction("inferno", 0.5, 2, 0.1)};
-  EXPECT_EQ(state.isovalues(), (Values{1, 2}));
+  EXPECT_EQ(drawn(), (Values{1, 2}));
   EXPECT_FALSE(state.frameOptions({3, 2}).scene->iso_of_colours);
   state.isosurfaces[0].visible = state.isosurfaces[3].visible = false;
-  EXPECT_EQ(state.isovalues(), Values{0.25});
+  EXPECT_EQ(drawn(), Values{0.25});
   EXPECT_TRUE(state.frameOptions({3, 2}).scene->iso_of_colours);
   expectParts(commandText(state, "a.splats"), {"--opacity-by density", "--iso 0.25", "--iso-by 'u v'"});
 
   state.opacity_by.reset();
   state.isosurfaces = {{"density", 1}};
-  EXPECT_TRUE(state.isovalues().empty());
+  EXPECT_TRUE(drawn().empty());
   EXPECT_EQ(commandText(state, "a.splats").find("--iso"), std::string::npos);
   state.volume = false;
-  EXPECT_EQ(state.isovalues(), Values{1});
+  EXPECT_EQ(drawn(), Values{1});
   expectParts(commandText(state, "a.splats"), {"--iso 1", "--iso-by density", "--volume off"});
+}
+
+/// Faces are tinted where they stand in the list, also where a scalar gives all of them their colours; the view stays.
+TEST(ViewState, TintsFacesInACopy) {
+  const ViewState state = changedState();
+  const std::string before = toJson(state);
+  ViewState shown = state.withTinted("walls");
+  EXPECT_EQ(toJson(state), before);
+  ASSERT_EQ(shown.faces.size(), 2u);
+  EXPECT_TRUE(shown.faces[1].visible && shown.faces[1].tinted);
+  EXPECT_FALSE(shown.faces[1].opacity.by_function);
+  const auto scene = shown.frameOptions({3, 2}).scene;
+  ASSERT_EQ(scene->grid_surfaces.size(), 2u);
+  EXPECT_FALSE(scene->grid_surfaces[0].own_colour);
+  EXPECT_TRUE(scene->grid_surfaces[1].own_colour);
+  shown = state.withTinted("kmin");
+  ASSERT_EQ(shown.faces.size(), 3u);
+  EXPECT_EQ(shown.faces[2].name, "kmin");
+  EXPECT_EQ(shown.faceNames().faces.size(), 2u);  // with the first, and without the hidden one
+}
+
+TEST(ViewState, AnIsosurfaceHasAColourOfItsOwn) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  state.isosurfaces = {{"density", 1}, {"density", 2, false, glm::vec3(1, 0, 0)}};
+  EXPECT_EQ(commandText(state).find("--iso-colour"), std::string::npos);
+  state.isosurfaces.push_back({"density", 2.5, true, glm::vec3(0, 0.5f, 1)});
+  expectParts(commandText(state), {"--iso 1,2.5", "--iso-colour 'function,#0080ff'"});
+  const auto scene = state.frameOptions({3, 2}).scene;
+  EXPECT_EQ(scene->isoColour(0), std::nullopt);
+  EXPECT_EQ(scene->isoColour(1), glm::vec3(0, 0.5f, 1));
 }
 
 /// Lines of the drawn scalar are drawn as by the command that is copied: in the picture's colours, without a bar of their own.
@@ -415,6 +450,14 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--iso-opacity 0.75",
                                                   "--slice-opacity 'function*0.5'",
                                                   "--volume off"});
+}
+
+TEST(RenderCommand, HasMoreMemoryWhereTheViewHas) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  state.memory_bytes = 100 << 20;
+  EXPECT_EQ(commandText(state).find("--memory"), std::string::npos);
+  state.memory_bytes = (700 << 20) + 1;
+  expectParts(commandText(state), {"--memory 701M"});
 }
 
 TEST(RenderCommand, OfTwoScalarsHasBothFunctions) {

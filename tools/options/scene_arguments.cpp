@@ -82,21 +82,45 @@ void checkSurfaceOpacities(const SurfaceArguments& arguments, bool has_opacities
           arguments.surfaces[n]);
 }
 
-std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
-  std::vector<double> values;
+/// The parts between the commas of all texts.
+std::vector<std::string> splitAtCommas(const std::vector<std::string>& texts) {
+  std::vector<std::string> parts;
   for (const std::string& text : texts)
     for (size_t begin = 0; begin <= text.size();) {
       const size_t end = std::min(text.find(',', begin), text.size());
-      values.push_back(parseNumber("--iso", text.substr(begin, end - begin)));
+      parts.push_back(text.substr(begin, end - begin));
       begin = end + 1;
     }
+  return parts;
+}
+
+std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
+  std::vector<double> values;
+  for (const std::string& text : splitAtCommas(texts)) values.push_back(parseNumber("--iso", text));
   return values;
 }
 
-glm::vec3 parseColour(const std::string& text) {
+/// `of`: what has the colour, in the names of the options.
+glm::vec3 parseColour(const std::string& of, const std::string& text) {
   if (text == "transparent")
-    throw UsageError("--surface-colour transparent: give #rrggbb, and --surface-opacity");
-  return glm::vec3(parseBackground("--surface-colour", text));
+    throw UsageError("--{0}-colour transparent: give #rrggbb, and --{0}-opacity", of);
+  return glm::vec3(parseBackground(fmt::format("--{}-colour", of), text));
+}
+
+/// A colour for each isosurface, in their order; empty: all have the function's.
+std::vector<std::optional<glm::vec3>> parseIsoColours(const SurfaceArguments& arguments) {
+  std::vector<std::optional<glm::vec3>> colours;
+  for (const std::string& text : splitAtCommas(arguments.iso_colours))
+    colours.push_back(text == "function" ? std::nullopt : std::optional(parseColour("iso", text)));
+  const size_t count = splitAtCommas(arguments.isovalues).size();
+  if (!colours.empty() && count == 0) throw UsageError("--iso-colour needs an isosurface: --iso VALUE");
+  if (colours.size() == 1)
+    for (size_t n = 1; n < count; ++n) colours.push_back(colours.front());
+  if (!colours.empty() && colours.size() != count)
+    throw UsageError(
+        "--iso-colour: has {} colours for {} isosurfaces; give one, or one for each value of --iso",
+        colours.size(), count);
+  return colours;
 }
 
 TriangleMesh meshFromFile(const std::filesystem::path& path) {
@@ -169,6 +193,13 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->allow_extra_args(false)
       ->group(group);
   command
+      .add_option("--iso-colour", arguments.iso_colours,
+                  "Colour #rrggbb of the isosurfaces, or one for each value of --iso, with commas; function: "
+                  "the transfer function's (default)")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
       .add_option(
           "--iso-opacity", arguments.iso_opacity,
           "Opacity of the isosurfaces, above 0 and at most 1; function: by the transfer function (that of "
@@ -191,7 +222,7 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
   if (!of_slices.opaque() && arguments.slices.empty() && !arguments.film_has_slices)
     throw UsageError("--slice-opacity needs a slice: --slice PX,PY,PZ,NX,NY,NZ");
   checkSurfaceOpacities(arguments, has_opacities);
-  for (const std::string& colour : arguments.colours) parseColour(colour);
+  for (const std::string& colour : arguments.colours) parseColour("surface", colour);
   if (arguments.colours.size() > 1 && arguments.colours.size() != arguments.surfaces.size())
     throw UsageError(
         "--surface-colour: given {} times for {} surfaces; give it once, or once for each --surface",
@@ -203,6 +234,7 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
     throw UsageError("--surface-by {} needs faces of the grid, such as --surface kmin", arguments.surface_by);
   requireChoice("--volume", arguments.volume, {"on", "off"});
   parseIsovalues(arguments.isovalues);
+  parseIsoColours(arguments);
   const SheetOpacity of_isosurfaces = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   if (!of_isosurfaces.opaque() && arguments.isovalues.empty())
     throw UsageError("--iso-opacity needs an isosurface: --iso VALUE");
@@ -271,7 +303,8 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
     const glm::vec3 colour =
         arguments.colours.empty()
             ? Surface().colour
-            : parseColour(arguments.colours.size() == 1 ? arguments.colours[0] : arguments.colours.at(n));
+            : parseColour("surface",
+                          arguments.colours.size() == 1 ? arguments.colours[0] : arguments.colours.at(n));
     if (isSurfaceFile(arguments.surfaces[n])) {
       Surface& surface = scene->surfaces.emplace_back();
       surface.mesh = std::make_shared<TriangleMesh>(meshFromFile(arguments.surfaces[n]));
@@ -300,6 +333,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   scene->slice_opacity = of_slices.factor;
   scene->slices_by_function = of_slices.by_function;
   scene->isovalues = parseIsovalues(arguments.isovalues);
+  scene->iso_colours = parseIsoColours(arguments);
   scene->iso_opacity = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   scene->iso_of_colours = scalars.iso_of_colours;
   scene->volume = arguments.volume == "on";

@@ -35,7 +35,7 @@ struct SurfaceArguments {
   std::vector<std::string> surface_opacities;
   std::string slice_opacity = "1", volume = "on";
   std::string surface_by;
-  std::vector<std::string> isovalues;
+  std::vector<std::string> isovalues, iso_colours;
   std::string iso_opacity = "1";
   CurveArguments curves;
   MapArguments map;

@@ -127,7 +127,7 @@ bool FilmPanel::drawMark(const FilmEdit& film, size_t n, const TimeScale& scale,
   ImGui::PushID(static_cast<int>(film.keys()[n].picture));
   ImGui::InvisibleButton("mark", {2 * half, 2 * half});
   ImGui::PopID();
-  nameWidget("mark of " + nameOf(n));
+  nameWithoutTab("mark of " + nameOf(n));
   const float mouse = ImGui::GetIO().MousePos.x;
   if (ImGui::IsItemActivated()) {
     actions.select = n;
@@ -166,7 +166,7 @@ void FilmPanel::drawTimeLine(const FilmEdit& film, PanelActions& actions) {
   for (size_t n = 0; n < film.keys().size(); ++n) dragging |= drawMark(film, n, scale, actions.film);
   ImGui::SetCursorScreenPos(corner);
   ImGui::InvisibleButton("time line", {scale.width + 2 * half, 2 * unit});
-  nameWidget("film time line");
+  nameWithoutTab("film time line");
   if (ImGui::IsItemActive()) {
     dragging = true;
     actions.film.go_to = scale.timeUnderMouse();

@@ -126,7 +126,7 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
                            {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
   ImGui::InvisibleButton("curve", canvas.size,
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
-  nameWidget("curve");
+  nameWithoutTab("curve");
   const ImVec2 mouse = ImGui::GetIO().MousePos;
   const bool over = ImGui::IsItemHovered();
   const std::optional<size_t> near = over ? pointNear(function, canvas, mouse) : std::nullopt;
@@ -197,6 +197,7 @@ bool FunctionPanel::drawPoints(EditedFunction& function) {
     ImGui::SameLine();
     ImGui::BeginDisabled(end);
     if (ImGui::Button("x")) removed = n;
+    nameWidget(fmt::format("remove point {}", n + 1));
     ImGui::EndDisabled();
     ImGui::PopID();
   }
@@ -268,11 +269,10 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
     ImGui::PushID(static_cast<int>(n));
     float rgb[3] = {static_cast<float>(point.rgb.x), static_cast<float>(point.rgb.y),
                     static_cast<float>(point.rgb.z)};
-    if (ImGui::ColorEdit3("##colour", rgb, ImGuiColorEditFlags_NoInputs)) {
+    if (colourSwatch("##colour", rgb, fmt::format("colour {}", n + 1))) {
       function.setColour(n, {double{rgb[0]}, double{rgb[1]}, double{rgb[2]}});
       changed = true;
     }
-    nameWidget(fmt::format("colour {}", n + 1));
     ImGui::SameLine(
         0, ImGui::CalcTextSize("colour").x - ImGui::GetFrameHeight() + ImGui::GetStyle().ItemSpacing.x);
     const double scalar = function.scalarAt(point.x);
@@ -284,10 +284,13 @@ bool FunctionPanel::drawColours(EditedFunction& function) {
     }
     ImGui::SameLine();
     if (ImGui::Button("x")) removed = n;
+    nameWidget(fmt::format("remove colour {}", n + 1));
     ImGui::EndDisabled();
     if (!end || n == 0) {
       ImGui::SameLine();
-      if (ImGui::Button("+")) {
+      const bool adds = ImGui::Button("+");
+      nameWidget(fmt::format("add colour {}", n + 1));
+      if (adds) {
         function.addColour(0.5 * (point.x + function.colours()[n + 1].x));
         changed = true;
       }
@@ -353,7 +356,8 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   };
   result.automatic |=
       button("automatic", "Automatic", "range and opacities as they are chosen from the data");
-  ImGui::SameLine();
+  const float gap = ImGui::GetStyle().ItemInnerSpacing.x;  // four of them fill the line
+  ImGui::SameLine(0, gap);
   if (button("ramp", "Ramp", "the colour map with its own opacities, which rise with the values")) {
     const std::string name = function.map().empty() ? kMapsOnDark.sequential : function.map();
     function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
@@ -361,7 +365,7 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   }
   const auto set = [&](const char* name, const char* text, const char* what,
                        std::span<const OpacityPoint> points) {
-    ImGui::SameLine();
+    ImGui::SameLine(0, gap);
     if (!button(name, text, what)) return;
     function.setOpacities({points.begin(), points.end()});
     result.changed = true;

@@ -49,7 +49,7 @@ void GradientPanel::drawHistogram(const std::vector<OpacityPoint>& points, size_
                            {availableWidth(), kHeight * ImGui::GetTextLineHeight()}};
   ImGui::InvisibleButton("##gradient histogram", canvas.size);
   const bool is_empty = !magnitudes_ || magnitudes_->histogram.shares().empty();
-  nameWidget(is_empty ? "empty gradient histogram" : "gradient histogram");
+  nameWithoutTab(is_empty ? "empty gradient histogram" : "gradient histogram");
   paintHistogram(is_empty ? std::vector<double>{} : magnitudes_->histogram.shares(), canvas);
   if (is_empty) return;
   const GradientHistogram& histogram = magnitudes_->histogram;
@@ -85,7 +85,7 @@ GradientPanel::Result GradientPanel::draw(std::vector<OpacityPoint>& points, siz
     if (points[n].opacity >= points.back().opacity) to = static_cast<float>(points[n].x);
   label("volume less steep");
   from *= 100, to *= 100;
-  if (ImGui::DragFloatRange2("##gradient", &from, &to, 0.3f, 0, 100, "hidden: %.0f %%", "whole: %.0f %%")) {
+  if (dragEnds("##gradient", from, to, {0.3f, 0, 100, "hidden: %.0f %%", "whole: %.0f %%"})) {
     const auto share = [](float percent) { return std::clamp(static_cast<double>(percent) / 100, 0.0, 1.0); };
     points = rampBetween(share(from), share(std::max(from, to)));
     result.changed = true;

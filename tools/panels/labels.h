@@ -35,6 +35,7 @@ struct PanelActions {
   std::optional<std::string> draw_isosurfaces_of;     // this scalar, by its opacities
   std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
   std::optional<std::string> add_faces;               // of the grid, by name
+  std::string pointed_faces;                          // that the mouse points at in a list; empty: none
   std::optional<std::pair<size_t, std::string>> isosurface_scalar;  // of the n-th one
   std::optional<std::string> colour_faces;  // by a scalar; the empty name: each has its own colour
   bool automatic_function = false;          // colours and opacities chosen from the data

@@ -129,6 +129,7 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   label("steps per second");
   float speed = static_cast<float>(playback.stepsPerSecond());
   if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f")) playback.setStepsPerSecond(speed);
+  nameWidget("steps per second");
   bool loops = playback.loops();
   if (option("loop", loops)) playback.setLoop(loops);
   bool backwards = playback.isBackwards();
@@ -355,7 +356,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   constexpr std::pair<Command, const char*> kSides[]{
       {Command::kLookPlusX, "+x"},     {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
       {Command::kLookMinusY, "-y"},    {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
-      {Command::kLookIsometric, "iso"}};
+      {Command::kLookIsometric, "Iso"}};
   label("look from");
   for (const auto& [command, text] : kSides) {
     commandButton(command, actions, text);
@@ -368,6 +369,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
     state.camera.view_angle_deg = static_cast<double>(angle);
     actions.changed = true;
   }
+  nameWidget("view angle");
   ImGui::EndDisabled();
   heading("Saved views");
   drawSavedViews(actions, facts.views);
@@ -431,6 +433,7 @@ void Panels::drawDetail(ViewState& state, PanelActions& actions) {
   if (ImGui::SliderInt("##memory", &mebibytes, 64, 65536, "%d", ImGuiSliderFlags_Logarithmic))
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
   actions.changed |= ImGui::IsItemDeactivatedAfterEdit();
+  nameWidget("memory, MiB");
   bool per_pixel = state.classification == Classification::kPixel;
   if (option("classify every pixel", per_pixel)) {
     state.classification = per_pixel ? Classification::kPixel : Classification::kFlat;

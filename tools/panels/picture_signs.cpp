@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include "tools/panels/labels.h"
 #include "tools/view/picture_layout.h"
@@ -18,6 +20,8 @@ namespace curvisplat {
 namespace {
 
 constexpr ImU32 kColour = IM_COL32(235, 140, 30, 255), kDragged = IM_COL32(255, 200, 60, 255);
+// One of the two stands out from any picture.
+constexpr ImU32 kDark = IM_COL32(0, 0, 0, 255), kLight = IM_COL32(255, 255, 255, 255);
 
 ImVec2 toImGui(const glm::dvec2& point) {
   return {static_cast<float>(point.x), static_cast<float>(point.y)};
@@ -32,12 +36,28 @@ double gripSize() {
   return 0.45 * static_cast<double>(ImGui::GetFontSize());
 }
 
+/// The width of each of the rings around a grip.
+float ringWidth() {
+  return std::max(1.0f, 0.1f * ImGui::GetFontSize());
+}
+
+/// Draws a line through points, with a dark edge on either side.
+void drawLine(std::span<const ImVec2> points, ImU32 colour, bool is_closed, float width) {
+  const ImDrawFlags flags = is_closed ? ImDrawFlags_Closed : ImDrawFlags_None;
+  const int count = static_cast<int>(points.size());
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  list->AddPolyline(points.data(), count, IM_COL32(0, 0, 0, 150), flags, width + ringWidth());
+  list->AddPolyline(points.data(), count, colour, flags, width);
+}
+
 /// Draws a grip over the picture. Returns whether it is pressed now.
 bool drawGrip(const glm::dvec2& at, const std::string& name, ImU32 colour, const char* help, Window& window) {
   const double size = gripSize();
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
-  list->AddCircleFilled(toImGui(at), static_cast<float>(size), colour);
-  list->AddCircle(toImGui(at), static_cast<float>(size), IM_COL32(0, 0, 0, 255));
+  const auto radius = static_cast<float>(size), ring = ringWidth();
+  list->AddCircleFilled(toImGui(at), radius + ring, kDark);
+  list->AddCircleFilled(toImGui(at), radius, kLight);
+  list->AddCircleFilled(toImGui(at), radius - ring, colour);
   const Rectangle grip{at.x - size, at.y - size, 2 * size, 2 * size};
   window.cover(grip);
   nameArea(name, grip.x, grip.y, grip.width, grip.height);
@@ -78,7 +98,6 @@ namespace {
 /// The edges of the clip box: what is clipped may be clear, so that the picture alone does not show where it
 /// ends.
 void drawBox(const WorldBox& box, const PlaceInWindow& place) {
-  ImDrawList* const list = ImGui::GetBackgroundDrawList();
   const auto corner = [&](unsigned n) {
     return place({n & 1 ? box.upper.x : box.lower.x, n & 2 ? box.upper.y : box.lower.y,
                   n & 4 ? box.upper.z : box.lower.z});
@@ -87,7 +106,8 @@ void drawBox(const WorldBox& box, const PlaceInWindow& place) {
     for (const unsigned axis : {1u, 2u, 4u}) {
       if (from & axis) continue;
       const auto begin = corner(from), end = corner(from | axis);
-      if (begin && end) list->AddLine(toImGui(*begin), toImGui(*end), kColour, 0.11f * ImGui::GetFontSize());
+      if (begin && end)
+        drawLine(std::array{toImGui(*begin), toImGui(*end)}, kColour, false, 0.11f * ImGui::GetFontSize());
     }
 }
 
@@ -134,9 +154,7 @@ bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Scene& scene) 
     seen &= corner.has_value();
     if (corner) corners[n] = toImGui(*corner);
   }
-  if (seen)
-    ImGui::GetBackgroundDrawList()->AddPolyline(corners.data(), 4, colour, ImDrawFlags_Closed,
-                                                0.11f * ImGui::GetFontSize());
+  if (seen) drawLine(corners, colour, true, 0.11f * ImGui::GetFontSize());
   const bool turns = drawTip(plane, number, frame.middle, scene);
   const bool moves = drawHandle(plane, number, {frame.normal, reach, *handle, *end}, scene);
   return turns || moves;
@@ -156,8 +174,7 @@ bool PlaneHandles::drawTip(ClipPlane& plane, size_t number, const glm::dvec3& mi
   if (length < nearest) along = length > 0.1 ? nearest / length * along : glm::dvec2(0, -nearest);
   const bool is_dragged = dragged_ && dragged_->number == number && dragged_->turns;
   const ImU32 colour = is_dragged ? kDragged : kColour;
-  ImGui::GetBackgroundDrawList()->AddLine(toImGui(handle), toImGui(handle + along), colour,
-                                          0.15f * ImGui::GetFontSize());
+  drawLine(std::array{toImGui(handle), toImGui(handle + along)}, colour, false, 0.15f * ImGui::GetFontSize());
   const bool pressed = drawGrip(handle + along, fmt::format("tip {}", number + 1), colour,
                                 "drag to turn the plane", scene.window);
   if (pressed && !dragged_) {
@@ -205,8 +222,10 @@ std::optional<size_t> pressedAxis(const std::array<glm::dvec2, 3>& places, Windo
     nameArea(fmt::format("axis {}", "xyz"[axis]), area.x, area.y, area.width, area.height);
     if (has_ring || !area.contains(mouse()) || ImGui::GetIO().WantCaptureMouse) continue;
     has_ring = true;
-    ImGui::GetBackgroundDrawList()->AddCircle(toImGui(places[axis]), static_cast<float>(radius), kColour, 0,
-                                              0.12f * ImGui::GetFontSize());
+    const float width = 0.12f * ImGui::GetFontSize();
+    for (const auto& [colour, more] : {std::pair(IM_COL32(0, 0, 0, 150), ringWidth()), {kColour, 0.0f}})
+      ImGui::GetBackgroundDrawList()->AddCircle(toImGui(places[axis]), static_cast<float>(radius), colour, 0,
+                                                width + more);
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) pressed = axis;
   }
   return pressed;

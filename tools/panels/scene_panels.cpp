@@ -95,9 +95,8 @@ bool drawHead(bool& visible, const std::string& title, glm::vec3* colour, const 
   actions.changed |= eye(visible, name);
   ImGui::SameLine();
   if (colour) {
-    actions.changed |= ImGui::ColorEdit3("##colour", glm::value_ptr(*colour), ImGuiColorEditFlags_NoInputs);
+    actions.changed |= colourSwatch("##colour", glm::value_ptr(*colour), "colour of " + name);
     actions.dragging |= ImGui::IsItemActive();
-    nameWidget("colour of " + name);
     ImGui::SameLine();
   }
   ImGui::AlignTextToFramePadding();
@@ -172,9 +171,9 @@ void CutPanel::drawClipBox(ViewState& state, PanelActions& actions) {
       return coordinateFormat(static_cast<double>(end), manifest.lower[axis], manifest.upper[axis]);
     };
     label(name);
-    if (ImGui::DragFloatRange2(fmt::format("##{}", name).c_str(), &lower, &upper, (highest - lowest) / 500,
-                               lowest, highest, format(lower).c_str(), format(upper).c_str(),
-                               ImGuiSliderFlags_AlwaysClamp)) {
+    const std::string of_lower = format(lower), of_upper = format(upper);
+    if (dragEnds(fmt::format("##clip {}", name).c_str(), lower, upper,
+                 {(highest - lowest) / 500, lowest, highest, of_lower.c_str(), of_upper.c_str()})) {
       state.clip_box->lower[axis] = static_cast<double>(lower);
       state.clip_box->upper[axis] = static_cast<double>(std::max(lower, upper));
       actions.changed = true;
@@ -205,25 +204,25 @@ void CutPanel::drawPlane(ListedPlane& plane, const std::string& name, const View
   const Manifest& manifest = cache_.manifest();
   const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
   const glm::dvec3 half = 0.5 * (manifest.upper - manifest.lower);
-  const auto turn = [&](const char* text, const glm::dvec3& normal) {
+  const auto turn = [&](const char* text, const char* way, const glm::dvec3& normal) {
     const bool turns = ImGui::Button(text);
-    nameWidget(fmt::format("{} {}", text, name));
+    nameWidget(fmt::format("{} {}", way, name));
     if (!turns) return;
     plane.normal = normal;
     actions.changed = true;
   };
   label("across");
-  turn("x", {1, 0, 0});
+  turn("x", "x", {1, 0, 0});
   ImGui::SameLine();
-  turn("y", {0, 1, 0});
+  turn("y", "y", {0, 1, 0});
   ImGui::SameLine();
-  turn("z", {0, 0, 1});
+  turn("z", "z", {0, 0, 1});
   ImGui::SameLine();
-  turn("view", planeBeforeViewer(manifest, state).normal);
+  turn("View", "view", planeBeforeViewer(manifest, state).normal);
   hint("facing you");
   if (name.starts_with("clip")) {
     ImGui::SameLine();
-    turn("flip", -plane.normal);
+    turn("Flip", "flip", -plane.normal);
     hint("keep the other side");
   }
   drawNormal(plane, name, actions);
@@ -291,6 +290,7 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
     for (const std::string& name : faces) {
       if (ImGui::Selectable(name.c_str())) actions.add_faces = name;
       nameWidget("add surface " + name);
+      if (ImGui::IsItemHovered()) actions.pointed_faces = name;
       if (const std::string what = meaningOf(name); !what.empty()) hint(what.c_str());
     }
     ImGui::EndCombo();
@@ -308,6 +308,7 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
   for (size_t n = 0; n < state.faces.size(); ++n) {
     NamedFaces& named = state.faces[n];
     ImGui::PushID(static_cast<int>(n));
+    const ImVec2 from = ImGui::GetCursorScreenPos();
     // With a scalar its colour is not seen.
     const std::string name = fmt::format("surface {}", n + 1);
     if (drawHead(named.visible, named.name, state.faces_by ? nullptr : &named.colour, name, actions))
@@ -317,6 +318,9 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
     actions.changed |= ImGui::Checkbox("times the volume's", &named.opacity.by_function);
     nameWidget(name + " by function");
     ImGui::EndDisabled();
+    const ImVec2 to(from.x + ImGui::GetContentRegionAvail().x, ImGui::GetCursorScreenPos().y);
+    if (ImGui::IsWindowHovered() && !ImGui::IsAnyItemActive() && ImGui::IsMouseHoveringRect(from, to))
+      actions.pointed_faces = named.name;
     ImGui::PopID();
   }
   removeAt(state.faces, removed, actions);
@@ -378,6 +382,7 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
     if (removeButton(name)) removed = n;
     if (chosen) actions.isosurface_scalar = {n, *chosen};
     drawValueOf(one, name, actions);
+    drawColourOf(one, name, state, actions);
     if (one.visible && one.scalar != state.isoScalar()) {
       ImGui::TextDisabled("not drawn: those of %s are", state.isoScalar().c_str());
       nameWidget(name + " is not drawn");
@@ -426,6 +431,29 @@ void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelAc
   actions.dragging |= ImGui::IsItemActive();
   nameWidget(name);
   hint("Ctrl + click to type a number");
+}
+
+/// Draws a colour of its own, or the function's, which choosing another one replaces.
+void SurfacePanel::drawColourOf(Isosurface& one, const std::string& name, const ViewState& state,
+                                PanelActions& actions) {
+  // A function of another scalar gives it many colours.
+  const glm::vec3 of_function = one.scalar == state.variable
+                                    ? glm::vec3(state.function.function().at(one.value).colour)
+                                    : Surface().colour;
+  glm::vec3 colour = one.colour.value_or(of_function);
+  label("colour");
+  if (colourSwatch("##colour", glm::value_ptr(colour), "colour of " + name)) {
+    one.colour = colour;
+    actions.changed = true;
+  }
+  actions.dragging |= ImGui::IsItemActive();
+  ImGui::SameLine();
+  bool is_of_function = !one.colour;
+  if (ImGui::Checkbox("the function's", &is_of_function)) {
+    one.colour = is_of_function ? std::nullopt : std::optional(colour);
+    actions.changed = true;
+  }
+  nameWidget(name + " by colours");
 }
 
 }  // namespace curvisplat

@@ -49,6 +49,8 @@ class SurfacePanel {
   void drawIsosurfaces(ViewState& state, PanelActions& actions);
   std::optional<std::string> chooseScalarOf(const Isosurface& one, const std::string& name) const;
   void drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions);
+  static void drawColourOf(Isosurface& one, const std::string& name, const ViewState& state,
+                           PanelActions& actions);
 
   const CacheReader& cache_;
   std::optional<size_t> surfaces_seen_, isosurfaces_seen_;  // in the frame before

@@ -72,7 +72,7 @@ void slider(const Playback& playback, float right, PanelActions& actions) {
     const double whole = std::floor(place);
     actions.time = StepPosition{static_cast<uint64_t>(whole), place - whole};
   }
-  nameWidget("step");
+  nameWithoutTab("step");
   actions.dragging |= ImGui::IsItemActive();
 }
 

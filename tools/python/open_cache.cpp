@@ -85,6 +85,7 @@ SurfaceArguments surfaceArguments(const Options& frame, const py::dict& others) 
   arguments.slices = of<Texts>(others, "slices");
   arguments.slice_opacity = of<std::string>(others, "slice_opacity");
   arguments.isovalues = of<Texts>(others, "isovalues");
+  arguments.iso_colours = of<Texts>(others, "iso_colour");
   if (others.contains("iso_opacity")) arguments.iso_opacity = of<std::string>(others, "iso_opacity");
   arguments.volume = of<bool>(others, "volume") ? "on" : "off";
   CurveArguments& curves = arguments.curves;

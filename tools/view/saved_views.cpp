@@ -256,13 +256,30 @@ void addSurfaceOpacities(const ViewState& state, CommandLine& words) {
   for (const SheetOpacity& opacity : opacities) words.add("--surface-opacity", text(opacity));
 }
 
+std::string hexText(const glm::vec3& colour) {
+  const glm::ivec3 rgb(255.0f * colour + 0.5f);
+  return fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b);
+}
+
+/// Adds options for the isosurfaces that are drawn.
+void addIsosurfaces(const ViewState& state, const SurfaceScene& scene, CommandLine& words) {
+  if (scene.isovalues.empty()) return;
+  words.add("--iso", fmt::format("{}", fmt::join(scene.isovalues, ",")));
+  std::vector<std::string> colours;
+  for (size_t n = 0; n < scene.isovalues.size(); ++n)
+    colours.push_back(scene.isoColour(n) ? hexText(*scene.isoColour(n)) : "function");
+  if (std::ranges::any_of(colours, [](const std::string& colour) { return colour != "function"; }))
+    words.add("--iso-colour", fmt::format("{}", fmt::join(colours, ",")));
+  if (state.isoScalar() != state.opacityScalar()) words.add("--iso-by", state.isoScalar());
+  if (!scene.iso_opacity.opaque()) words.add("--iso-opacity", text(scene.iso_opacity));
+}
+
 /// Adds options for surfaces, slices (but for a film's) and isosurfaces, except for those that are hidden.
 void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {
   std::vector<std::string> colours;
   const auto add = [&](const std::string& name, const glm::vec3& colour) {
-    const glm::ivec3 rgb(255.0f * colour + 0.5f);
     words.add("--surface", name);
-    colours.push_back(fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
+    colours.push_back(hexText(colour));
   };
   for (const SurfaceFile& surface : state.surfaces)
     if (surface.visible) add(shortPath(surface.path).string(), surface.colour);
@@ -277,11 +294,7 @@ void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {
     for (const ClipPlane& plane : scene->slices) words.add("--slice", text(plane));
   const SheetOpacity of_slices{scene->slice_opacity, scene->slices_by_function};
   if (!of_slices.opaque() && !scene->slices.empty()) words.add("--slice-opacity", text(of_slices));
-  if (!scene->isovalues.empty()) {
-    words.add("--iso", fmt::format("{}", fmt::join(scene->isovalues, ",")));
-    if (state.isoScalar() != state.opacityScalar()) words.add("--iso-by", state.isoScalar());
-    if (!scene->iso_opacity.opaque()) words.add("--iso-opacity", text(scene->iso_opacity));
-  }
+  addIsosurfaces(state, *scene, words);
   if (!state.drawsVolume()) words.add("--volume", "off");
 }
 
@@ -319,6 +332,9 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   }
   if (options.turns) words.add("--orbit", "360");
   if (state.lod_pixels != 1) words.add("--lod-pixels", number(state.lod_pixels));
+  // With less the command draws the same.
+  if (state.memory_bytes > ViewState::kMemoryBytes)
+    words.add("--memory", fmt::format("{}M", (state.memory_bytes + (1 << 20) - 1) >> 20));
   if (state.classification == Classification::kFlat) words.add("--classify", "flat");
   if (state.scale != glm::dvec3(1.0))
     words.add("--scale", fmt::format("{},{},{}", state.scale.x, state.scale.y, state.scale.z));

@@ -158,10 +158,14 @@ void putSurfaces(Json& json, const ViewState& state) {
   json["slices"] = jsonOf(state.slices);
   json["slice_opacity"] = state.slice_opacity.factor;
   json["slices_by_function"] = state.slice_opacity.by_function;
-  json["isovalues"] = state.isovalues();  // those that are drawn, for readers of earlier versions
+  json["isovalues"] = Json::array();  // those that are drawn, for readers of earlier versions
+  for (const Isosurface& one : state.drawnIsosurfaces()) json["isovalues"].push_back(one.value);
   json["isosurfaces"] = Json::array();
-  for (const Isosurface& one : state.isosurfaces)
-    json["isosurfaces"].push_back({{"scalar", one.scalar}, {"value", one.value}, {"visible", one.visible}});
+  for (const Isosurface& one : state.isosurfaces) {
+    json["isosurfaces"].push_back(
+        {{"scalar", one.scalar}, {"value", one.value}, {"visible", one.visible}, {"colour", nullptr}});
+    if (one.colour) json["isosurfaces"].back()["colour"] = jsonOf(glm::dvec3(*one.colour));
+  }
   json["iso_opacity"] = state.iso_opacity.factor;
   json["isosurfaces_by_function"] = state.iso_opacity.by_function;
   json["volume"] = state.volume;
@@ -249,9 +253,11 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
     state.slice_opacity.factor = opacity->number(1e-3, 1);
   if (const auto by = fields.find("slices_by_function")) state.slice_opacity.by_function = by->flag();
   if (const auto isosurfaces = fields.find("isosurfaces")) {
-    for (const JsonField& one : isosurfaces->elements(kMaxIsovalues))
+    for (const JsonField& one : isosurfaces->elements(kMaxIsovalues)) {
       state.isosurfaces.push_back(
           {one.at("scalar").text(), one.at("value").number(-1e300, 1e300), visibleFrom(one)});
+      if (const auto colour = one.find("colour")) state.isosurfaces.back().colour = colourFrom(*colour);
+    }
   } else if (const auto values = fields.find("isovalues")) {  // earlier versions had those of one scalar
     for (const JsonField& value : values->elements(kMaxIsovalues))
       state.isosurfaces.push_back({state.opacityScalar(), value.number(-1e300, 1e300)});
@@ -275,11 +281,11 @@ const std::string& ViewState::isoScalar() const {
   return volume || other == isosurfaces.end() ? variable : other->scalar;
 }
 
-std::vector<double> ViewState::isovalues() const {
-  std::vector<double> values;
+std::vector<Isosurface> ViewState::drawnIsosurfaces() const {
+  std::vector<Isosurface> drawn;
   for (const Isosurface& one : isosurfaces)
-    if (one.visible && one.scalar == isoScalar()) values.push_back(one.value);
-  return values;
+    if (one.visible && one.scalar == isoScalar()) drawn.push_back(one);
+  return drawn;
 }
 
 void ViewState::takeOpacitiesFor(const std::string& scalar) {
@@ -314,6 +320,17 @@ bool ViewState::hasSheets() const {
 
 SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
   return {named.opacity.factor, named.opacity.by_function && (faces_by || opacity_by)};
+}
+
+ViewState ViewState::withTinted(const std::string& faces_name) const {
+  ViewState shown = *this;
+  const NamedFaces tinted{faces_name, {1, 0.55f, 0.1f}, {0.7}, true, true};
+  const auto listed = std::ranges::find(shown.faces, faces_name, &NamedFaces::name);
+  if (listed != shown.faces.end())
+    *listed = tinted;
+  else
+    shown.faces.push_back(tinted);
+  return shown;
 }
 
 FaceNames ViewState::faceNames() const {
@@ -386,6 +403,8 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
       surface.opacity = opacityOf(named);
       surface.function = of_faces;
       surface.colours = colours;
+      surface.own_colour = named.tinted;
+      if (named.tinted) continue;
       if (given && given->earth && named.name == given->faces_with_map) surface.map = given->earth->map;
     }
     if (given) {
@@ -399,7 +418,10 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     }
     scene->slices = visiblePlanes(slices);
     scene->slice_opacity = slice_opacity.factor;
-    scene->isovalues = isovalues();
+    for (const Isosurface& one : drawnIsosurfaces()) {
+      scene->isovalues.push_back(one.value);
+      scene->iso_colours.push_back(one.colour);
+    }
     scene->iso_of_colours = opacity_by && isoScalar() == variable;
     scene->iso_opacity = iso_opacity;
     // The picture's function has no opacities for a third scalar.

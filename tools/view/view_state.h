@@ -40,6 +40,7 @@ struct NamedFaces {
   glm::vec3 colour{0.7f, 0.7f, 0.7f};
   SheetOpacity opacity = {};
   bool visible = true;
+  bool tinted = false;  // by `colour`, where all have a scalar's; never saved
 };
 
 /// A clip plane or a slice.
@@ -51,6 +52,7 @@ struct Isosurface {
   std::string scalar;
   double value = 0;
   bool visible = true;
+  std::optional<glm::vec3> colour = std::nullopt;  // none: the function's
 };
 
 /// The scalar that colours the grid's faces, and the function that gives them colours where the picture
@@ -94,12 +96,13 @@ struct OpacitiesBefore {
 
 struct ViewState {
   static constexpr double kLightStrength = 0.7;
+  static constexpr uint64_t kMemoryBytes = 512 << 20;
 
   std::string variable;
   Camera camera;
   EditedFunction function;
   double lod_pixels = 1;
-  uint64_t memory_bytes = 512 << 20;
+  uint64_t memory_bytes = kMemoryBytes;
   Classification classification = Classification::kPixel;
   glm::dvec3 scale{1.0};
   std::optional<WorldBox> clip_box = std::nullopt;
@@ -131,8 +134,8 @@ struct ViewState {
   /// The scalar whose isosurfaces are drawn: that of the opacities if there are any of it, otherwise that of the colours.
   /// Without the volume, another one where it alone has isosurfaces.
   const std::string& isoScalar() const;
-  /// The values of the isosurfaces that are drawn, all of isoScalar().
-  std::vector<double> isovalues() const;
+  /// The isosurfaces that are drawn, all of isoScalar().
+  std::vector<Isosurface> drawnIsosurfaces() const;
   /// Keeps the present opacities for giveOpacitiesBack(), before those of `scalar` take their place so that its isosurfaces are drawn.
   void takeOpacitiesFor(const std::string& scalar);
   /// Gives the volume the opacities again that it had before, once no isosurface of that scalar is left, hidden or not. Returns
@@ -149,6 +152,8 @@ struct ViewState {
   /// The opacity of faces as they are drawn: without a scalar there is no function.
   SheetOpacity opacityOf(const NamedFaces& named) const;
   FaceNames faceNames() const;
+  /// The same with the faces of a name tinted, listed or not: what the mouse points at in a list of them.
+  ViewState withTinted(const std::string& faces_name) const;
   /// The factor by which heights are exaggerated: z, and on a flat map what the cache was converted with as well.
   double verticalScale(const std::optional<Globe>& globe) const;
   /// Changes it, and keeps the same place in focus.

@@ -11,6 +11,8 @@
 #include "render/frame/first_picture.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/os.h"
+#include "stream/base/text.h"
 #include "tools/panels/time_bar.h"
 #include "tools/view/first_view.h"
 #include "tools/view/picture_layout.h"
@@ -66,6 +68,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
                      Reports& reports, FileDialog& dialog, std::shared_future<void> after)
     : cache_(prepared.cache.atStep(prepared.cache.step())),
       target_s_(options.target_s),
+      may_raise_memory_(!options.memory_bytes),
       faces_at_(options.faces.at),
       face_names_(prepared.face_names),
       elsewhere_(prepared.elsewhere),
@@ -207,6 +210,10 @@ void CacheView::takeFrame() {
   try {
     frame = frames_->poll();
     if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
+  } catch (const TooLittleMemory& error) {
+    if (raiseMemory(error)) return;
+    giveUpRequest();
+    throw;
   } catch (const UsageError&) {  // of this request only
     giveUpRequest();
     throw;
@@ -236,6 +243,20 @@ void CacheView::takeFrame() {
   shown_ = std::move(frame);
   annotate();
   reportDamage();
+}
+
+/// Gives pictures more memory, where programs can have so much, and draws again. Returns whether it did: a limit that was
+/// given, or set below the usual one, stays.
+bool CacheView::raiseMemory(const TooLittleMemory& error) {
+  const uint64_t now = state_.memory_bytes, available = os::availableMemory();
+  const uint64_t wanted = std::max(error.least_bytes, now + now / 4);
+  if (!may_raise_memory_ || now < ViewState::kMemoryBytes || (available > 0 && wanted > available))
+    return false;
+  state_.memory_bytes = wanted;
+  changed_ = true;
+  say(fmt::format("Pictures may take {} of memory now: this one needs more than {}.", byteText(wanted),
+                  byteText(now)));
+  return true;
 }
 
 /// Neither its picture nor its values will come.
@@ -358,6 +379,9 @@ void CacheView::apply(const PanelActions& actions) {
   if (actions.automatic_opacities && state_.opacity_by)
     chooser_.ask({FunctionChooser::For::kOpacities, state_.opacity_by->variable});
   if (actions.add_faces) addFaces(*actions.add_faces);
+  // What is saved has no tint.
+  const std::string pointed = save_to_ || actions.add_faces ? "" : actions.pointed_faces;
+  changed_ |= pointed != std::exchange(pointed_faces_, pointed);
   if (actions.colour_faces) colourFaces(*actions.colour_faces);
   if (actions.isosurface_scalar)
     findIsosurface(actions.isosurface_scalar->second, actions.isosurface_scalar->first);
@@ -381,15 +405,16 @@ void CacheView::ask(bool moving, bool only_final) {
   was_moving_ = moving;
   changed_ = false;  // what cannot be drawn is not tried again before it changes
   rests_ = false;
+  const ViewState& drawn = pointed_faces_.empty() ? state_ : state_.withTinted(pointed_faces_);
   const ShownFunctions functions(state_, manifest());
   FrameRequest request{functions.scalars(cache_, state_), function_version_, state_.camera,
-                       state_.frameOptions(data_size_)};
+                       drawn.frameOptions(data_size_)};
   request.moving = moving;
   request.only_final = only_final;
   request.step = playback_.step();
   request.part = playback_.position().part;
   request.next = playback_.next();
-  request.faces = state_.faceNames();
+  request.faces = drawn.faceNames();
   request.faces_at = faces_at_;
   // The processor saves pictures, and puts what lies behind the data there.
   request.may_stay_on_card = !save_to_ && request.options.background.a >= 1;

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/image/too_little_memory.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/panels/panels.h"
@@ -147,6 +148,7 @@ class CacheView {
   void drawFilmPictures();
   MovieRequest filmMovie(const std::filesystem::path& file, std::vector<double> times) const;
   std::optional<double> seriesTime() const;
+  bool raiseMemory(const TooLittleMemory& error);
   void giveUpSaving();
   void giveUpRequest();
   void startFrames(std::shared_future<void> after = {});
@@ -196,6 +198,7 @@ class CacheView {
 
   const CacheReader cache_;
   const double target_s_;
+  const bool may_raise_memory_;  // nobody has limited it
   const FacesAtStep faces_at_;
   const std::vector<std::string> face_names_;  // that the list of surfaces offers
   const std::vector<std::string> elsewhere_;   // scalars that the whole cache has besides
@@ -210,7 +213,8 @@ class CacheView {
   History history_;
   Panels panels_;
   PlaneHandles handles_;
-  bool shows_frames_ = true;  // of clip planes, slices and the clip box
+  bool shows_frames_ = true;   // of clip planes, slices and the clip box
+  std::string pointed_faces_;  // that are tinted, since the mouse points at them in a list; empty: none
   Playback playback_;
   Navigation navigation_;
   const Backend backend_;

@@ -332,7 +332,9 @@ void CacheView::copyCommand(MovieKind what) {
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);
-    const char* const shown = of_film ? "the film" : what == MovieKind::kOneTurn ? "a movie" : "this picture";
+    const char* const shown = of_film                       ? "the film"
+                              : what == MovieKind::kOneTurn ? "a film once around"
+                                                            : "this picture";
     // Its paths are short ones.
     say(fmt::format("copied the command for {}; paste it into a terminal in {}", shown,
                     fs::current_path().string()));

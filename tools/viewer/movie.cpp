@@ -169,7 +169,8 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
   MovieFrames pictures(movie, size, progress);
   const std::unique_ptr<MovieOutput> output =
       is_picture ? std::make_unique<OnePicture>(file) : open(file, size, movie.frames_per_s);
-  progress.begin("drawing frames", frames, "frames");
+  is_picture ? progress.begin("drawing the picture", 1, "picture")
+             : progress.begin("drawing frames", frames, "frames");
   for (uint64_t frame = 0; frame < frames; ++frame) {
     output->write(frame, pictures.draw(frame));
     progress.advance(1);

@@ -31,7 +31,8 @@ void takeScene(const ViewerOptions& options, const CacheReader& cache, ViewState
   if (!options.faces_by.empty())
     state.faces_by = FacesScalar{options.faces_by, automaticFunction(cache, options.faces_by)};
   state.isosurfaces.clear();
-  for (const double value : scene.isovalues) state.isosurfaces.push_back({state.opacityScalar(), value});
+  for (size_t n = 0; n < scene.isovalues.size(); ++n)
+    state.isosurfaces.push_back({state.opacityScalar(), scene.isovalues[n], true, scene.isoColour(n)});
   state.iso_opacity = scene.iso_opacity;
   state.slices.clear();
   for (const ClipPlane& plane : scene.slices) state.slices.push_back({plane});

@@ -114,7 +114,7 @@ class Viewer {
     opened_.drawOpening(display);
     if (!movie_ || !display.draw(*movie_, "movie")) return;
     movie_.reset();
-    reports_.say(fmt::format("Stopped. The {} was not saved.", saves_picture_ ? "picture" : "movie"));
+    reports_.say(fmt::format("Stopped. The {} was not saved.", saves_picture_ ? "picture" : "film"));
   }
 
   WindowLayout layout() const {

@@ -44,21 +44,21 @@ const std::vector<std::string>& dataEndings() {
 Look lookOf(FileDialog::Purpose purpose) {
   switch (purpose) {
     case FileDialog::Purpose::kOpenData:
-      return {"Open a cache or a grid", "open", false, dataEndings()};
+      return {"Open a cache or a grid", "Open", false, dataEndings()};
     case FileDialog::Purpose::kLoadFunction:
-      return {"Load colours and opacities", "load", false, {".json"}};
+      return {"Load colours and opacities", "Load", false, {".json"}};
     case FileDialog::Purpose::kSaveFunction:
-      return {"Save colours and opacities", "save", true, {".json"}};
+      return {"Save colours and opacities", "Save", true, {".json"}};
     case FileDialog::Purpose::kSavePicture:
-      return {"Save picture", "save", true, {".png", ".exr", ".pfm"}};
+      return {"Save picture", "Save", true, {".png", ".exr", ".pfm"}};
     case FileDialog::Purpose::kOpenSurface:
-      return {"Add a surface", "add", false, {".stl", ".ply", ".obj"}};
+      return {"Add a surface", "Add", false, {".stl", ".ply", ".obj"}};
     case FileDialog::Purpose::kOpenFilm:
-      return {"Open a film", "open", false, {".json"}};
+      return {"Open a film", "Open", false, {".json"}};
     case FileDialog::Purpose::kSaveFilm:
-      return {"Save film", "save", true, {".json"}};
+      return {"Save film", "Save", true, {".json"}};
     case FileDialog::Purpose::kSaveMovie:
-      return {"Save film", "save", true, {".mp4", ".gif", ".html", ".png"}};
+      return {"Save film", "Save", true, {".mp4", ".gif", ".html", ".png"}};
   }
   return {"", ""};
 }
@@ -169,8 +169,11 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   nameWidget("file up");
   ImGui::SameLine();
   const char* const home = std::getenv("HOME");
-  if (home && ImGui::Button("Home")) enter(home);
-  if (home) ImGui::SameLine();
+  if (home) {
+    if (ImGui::Button("Home")) enter(home);
+    nameWidget("file home");
+    ImGui::SameLine();
+  }
   ImGui::TextUnformatted(folder_.c_str());
   help_ ? drawHelp(look.saves) : drawEntries(accepts);
   ImGui::SetNextItemWidth(-1);
@@ -272,8 +275,8 @@ void FileDialog::drawSize() {
     if (ImGui::Button(text)) size_ = size;
     nameWidget(fmt::format("picture size {}", text));
   };
-  offer("as shown", offered_size_);
-  offer("twice that",
+  offer("As shown", offered_size_);
+  offer("Twice that",
         {std::min(kMaxSide, 2 * offered_size_.width), std::min(kMaxSide, 2 * offered_size_.height)});
   offer("1920 x 1080", {1920, 1080});
   offer("3840 x 2160", {3840, 2160});

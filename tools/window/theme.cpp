@@ -19,6 +19,7 @@ void setTheme(ImGuiStyle& style, bool light) {
     for (const ImGuiCol chosen : {ImGuiCol_HeaderHovered, ImGuiCol_TabHovered})
       set(chosen, 0.26f, 0.59f, 0.98f, 0.35f);
     set(ImGuiCol_HeaderActive, 0.26f, 0.59f, 0.98f, 0.5f);
+    set(ImGuiCol_NavHighlight, 0.0f, 0.1f, 0.4f, 1);
   } else {
     set(ImGuiCol_TextDisabled, 0.7f, 0.7f, 0.7f, 1);
     for (const ImGuiCol hovered : {ImGuiCol_ButtonHovered, ImGuiCol_TabHovered})
@@ -28,6 +29,7 @@ void setTheme(ImGuiStyle& style, bool light) {
     set(ImGuiCol_HeaderHovered, 0.2f, 0.45f, 0.75f, 0.5f);
     set(ImGuiCol_HeaderActive, 0.2f, 0.45f, 0.75f, 0.6f);
     set(ImGuiCol_FrameBgActive, 0.2f, 0.45f, 0.75f, 0.67f);
+    set(ImGuiCol_NavHighlight, 1.0f, 0.8f, 0.3f, 1);
   }
   // What lies behind a dialog gets darker in both themes, and numbers are legible through what moves along a slider.
   set(ImGuiCol_ModalWindowDimBg, 0, 0, 0, 0.45f);
@@ -64,6 +66,14 @@ std::vector<TextOnPaper> textsOf(bool light) {
              ImGuiCol_ButtonHovered, ImGuiCol_ButtonActive, ImGuiCol_Header, ImGuiCol_HeaderHovered,
              ImGuiCol_HeaderActive, ImGuiCol_Tab, ImGuiCol_TabHovered, ImGuiCol_TabActive})
       add(ImGuiCol_Text, window, widget, 1);
+    // The ring of the keyboard's focus, around widgets as they are and as the mouse finds them.
+    for (const ImGuiCol widget : std::initializer_list<ImGuiCol>{
+             window, ImGuiCol_MenuBarBg, ImGuiCol_FrameBg, ImGuiCol_FrameBgHovered, ImGuiCol_FrameBgActive,
+             ImGuiCol_Button, ImGuiCol_ButtonHovered, ImGuiCol_Header, ImGuiCol_HeaderHovered, ImGuiCol_Tab,
+             ImGuiCol_TabActive}) {
+      add(ImGuiCol_NavHighlight, window, widget, 1);
+      texts.back().least = 3;
+    }
     // Notes, and at the right of a list's entries.
     for (const ImGuiCol widget :
          std::initializer_list<ImGuiCol>{window, ImGuiCol_FrameBg, ImGuiCol_Header, ImGuiCol_HeaderHovered})

@@ -17,6 +17,7 @@ void setTheme(ImGuiStyle& style, bool light);
 struct TextOnPaper {
   std::string name;
   std::array<double, 3> text, paper;
+  double least = 4.5;  // the contrast that it needs; a ring needs 3
 };
 /// All that a theme has.
 std::vector<TextOnPaper> textsOf(bool light);

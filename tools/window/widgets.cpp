@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -19,6 +20,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/plugin.h"
+#include "tools/window/keyboard_focus.h"
 
 namespace curvisplat {
 namespace {
@@ -81,6 +83,57 @@ bool loadFont(float pixels, float pixels_per_unit) {
   return false;
 }
 
+namespace {
+
+/// Lets Tab stop at the item that Dear ImGui drew last, and says where the focus is.
+void letTabReach(const std::string& name, ImGuiID part = 0) {
+  if (!keyboardFocus().offer(part)) return;
+  const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
+  nameArea("focus " + name, static_cast<double>(at.x), static_cast<double>(at.y), static_cast<double>(size.x),
+           static_cast<double>(size.y));
+}
+
+/// Draws several fields beside each other, as Dear ImGui's do that have more than one number, but so that Tab stops at each.
+/// Returns whether any says that it has changed. `label` begins with ##.
+bool drawBeside(const char* label, size_t count, const std::function<bool(size_t)>& field) {
+  bool changed = false;
+  ImGui::BeginGroup();
+  ImGui::PushID(label);
+  ImGui::PushMultiItemsWidths(static_cast<int>(count), ImGui::CalcItemWidth());
+  for (size_t n = 0; n < count; ++n) {
+    ImGui::PushID(static_cast<int>(n));
+    if (n > 0) ImGui::SameLine(0, ImGui::GetStyle().ItemInnerSpacing.x);
+    changed |= field(n);
+    letTabReach(fmt::format("{} {}", label + 2, n + 1));
+    ImGui::PopID();
+    ImGui::PopItemWidth();
+  }
+  ImGui::PopID();
+  ImGui::EndGroup();
+  return changed;
+}
+
+}  // namespace
+
+bool colourSwatch(const char* label, float* rgb, const std::string& name) {
+  const bool changed = ImGui::ColorEdit3(label, rgb, ImGuiColorEditFlags_NoInputs);
+  ImGui::PushID(label);
+  letTabReach(name, ImGui::GetID("##ColorButton"));
+  ImGui::PopID();
+  nameWithoutTab(name);
+  return changed;
+}
+
+bool dragEnds(const char* label, float& low, float& high, const DraggedEnds& ends) {
+  const auto [speed, lowest, highest, low_format, high_format] = ends;
+  return drawBeside(label, 2, [&](size_t n) {
+    return n == 0 ? ImGui::DragFloat("", &low, speed, lowest, std::min(highest, high), low_format,
+                                     ImGuiSliderFlags_AlwaysClamp)
+                  : ImGui::DragFloat("", &high, speed, std::max(lowest, low), highest, high_format,
+                                     ImGuiSliderFlags_AlwaysClamp);
+  });
+}
+
 std::optional<std::array<double, TypedNumbers::kMax>> TypedNumbers::draw(const char* label,
                                                                          std::span<const double> values,
                                                                          const char* format) {
@@ -88,8 +141,11 @@ std::optional<std::array<double, TypedNumbers::kMax>> TypedNumbers::draw(const c
   const ImGuiID id = ImGui::GetID(label);
   std::array<double, kMax> numbers = typed_;
   if (field_ != id) std::ranges::copy(values, numbers.begin());
-  if (ImGui::InputScalarN(label, ImGuiDataType_Double, numbers.data(), static_cast<int>(values.size()),
-                          nullptr, nullptr, format, ImGuiInputTextFlags_CharsScientific)) {
+  const auto field = [&](size_t n) {
+    return ImGui::InputScalar("", ImGuiDataType_Double, &numbers[n], nullptr, nullptr, format,
+                              ImGuiInputTextFlags_CharsScientific);
+  };
+  if (drawBeside(label, values.size(), field)) {
     field_ = id;
     typed_ = numbers;
   }
@@ -123,6 +179,11 @@ Places& places() {
 }  // namespace
 
 void nameWidget(const std::string& name) {
+  letTabReach(name);
+  nameWithoutTab(name);
+}
+
+void nameWithoutTab(const std::string& name) {
   // A list that has just opened does not know its size yet, and so not its place.
   if (!places().file || ImGui::IsWindowAppearing()) return;
   const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();

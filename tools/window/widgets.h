@@ -37,13 +37,28 @@ class TypedNumbers {
   int frames_ = 0;  // for which Tab may still be on its way to another of its fields
 };
 
+/// Draws a swatch of a colour, red, green and blue from 0 to 1, which opens a picker; named. Returns whether the colour has
+/// changed. `label` is Dear ImGui's.
+bool colourSwatch(const char* label, float* rgb, const std::string& name);
+
+/// The two ends of a range that are dragged: how far per pixel, the ends of both, and printf's formats.
+struct DraggedEnds {
+  float speed, lowest, highest;
+  const char *low_format, *high_format;
+};
+/// Draws two numbers beside each other that are dragged or typed, the first at most the second. Returns whether one has
+/// changed. `label` is Dear ImGui's, and begins with ##.
+bool dragEnds(const char* label, float& low, float& high, const DraggedEnds& ends);
+
 // Tests and scripts drive the window by the names of its widgets: if the environment has
 // CURVISPLAT_WIDGETS=FILE, the file has a line "X Y WIDTH HEIGHT NAME" for each named widget of the frame
 // that was drawn last, in the window's coordinates. Two with one identifier, of which Dear ImGui hears only the first, have a
 // line that begins with "twins:" besides.
 
-/// Names the item that Dear ImGui drew last.
+/// Names the item that Dear ImGui drew last, at which Tab stops (keyboard_focus.h).
 void nameWidget(const std::string& name);
+/// The same of one that the mouse alone can use.
+void nameWithoutTab(const std::string& name);
 
 /// Names a rectangle that is not an item.
 void nameArea(const std::string& name, double x, double y, double width, double height);

@@ -16,6 +16,7 @@
 
 #include "render/gl/gl_context.h"
 #include "stream/base/error.h"
+#include "tools/window/keyboard_focus.h"
 #include "tools/window/theme.h"
 #include "tools/window/widgets.h"
 
@@ -337,6 +338,7 @@ void Window::beginFrame() {
   ImGui_ImplGlfw_NewFrame();
   showInput();
   ImGui::NewFrame();
+  keyboardFocus().beginFrame(shown_keys_);
 }
 
 void Window::coverCurrent() {
@@ -416,6 +418,8 @@ std::vector<Window::Key> Window::takeKeys() {
     return std::string_view("ACVXYZ").find(static_cast<char>(key.code)) != std::string_view::npos;
   };
   if (ImGui::GetIO().WantTextInput) std::erase_if(keys, edits);
+  if (keyboardFocus().isShown())
+    std::erase_if(keys, [](const Key& key) { return key.code == GLFW_KEY_SPACE; });
   return keys;
 }
 

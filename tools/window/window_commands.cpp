@@ -299,7 +299,7 @@ void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& 
 
 void drawKeys(bool& open, Window& window) {
   if (!open) return;
-  constexpr std::array<std::pair<const char*, const char*>, 10> kMouse{{
+  constexpr std::array<std::pair<const char*, const char*>, 12> kMouse{{
       {"left drag", "rotate; while flying, look around"},
       {"wheel", "zoom to what is under the mouse"},
       {"right drag", "zoom"},
@@ -310,6 +310,8 @@ void drawKeys(bool& open, Window& window) {
       {"click into the curve", "add an opacity point; drag it; right click removes it"},
       {"Shift + drag in the curve", "move all points but the first and the last sideways"},
       {"drop files", "open them"},
+      {"Tab, Shift + Tab", "go to the next button, field or slider, and back"},
+      {"Space, Return", "press it; Esc leaves it"},
   }};
   if (beginWindow("Keys and mouse", open, window)) {
     const auto row = [](const char* key, const char* what) {

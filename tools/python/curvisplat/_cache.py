@@ -354,7 +354,7 @@ class Cache:
                interpolate: bool = False, surfaces: Union[str, Sequence[str]] = (), surface_colours: Union[str, Sequence[str]] = (),
                surface_by: str = "", surface_opacity: Union[float, str, Sequence[Union[float, str]]] = (), slices: Sequence[Vector] = (),
                slice_opacity: Union[float, str] = 1, isovalues: Sequence[float] = (),
-               iso_opacity: Union[float, str, None] = None, iso_by: str = "",
+               iso_opacity: Union[float, str, None] = None, iso_by: str = "", iso_colour: Union[str, Sequence[str]] = (),
                volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
                light_direction: Optional[Vector] = None, shadow: Optional[float] = None, ambient_occlusion: Optional[float] = None,
                gradient_opacity: Union[str, Sequence[Tuple[float, float]], None] = None, background: str = "dark", scalar_bar: bool = False,
@@ -411,7 +411,7 @@ class Cache:
 
         look_at: (longitude, latitude), from_height: kilometres; a camera above that place.
 
-        isovalues: of the scalar, or of iso_by. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
+        isovalues: of the scalar, or of iso_by; iso_colour: "#rrggbb" or "function", of all or of each. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
         function.
 
         volume: False leaves the volume out. background: "dark" (#15171c), "white", another colour, or "transparent"; colours that are chosen suit it.
@@ -461,6 +461,7 @@ class Cache:
                   "point_size": _text(point_size), "lines_opacity": _text(lines_opacity),
                   "slices": _arguments.planes("slices", slices, _numbers), "slice_opacity": _text(slice_opacity),
                   "isovalues": [_number(value) for value in _arguments.several(isovalues, (int, float))],
+                  "iso_colour": _arguments.several(iso_colour),
                   "volume": _arguments.flag("volume", volume), "shade": _arguments.flag("shade", shade),
                   "threads": _arguments.whole("threads", threads),
                   "keep_going": _arguments.flag("keep_going", keep_going), "backend": backend,
