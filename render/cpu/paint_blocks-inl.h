@@ -231,11 +231,19 @@ struct Scalar {
   float nearer = 0, seen_half_width = 0;
 };
 
-/// A block of which every pixel that the splat touches is looked up: one whose bit is set.
+/// A block of which every pixel that the splat touches is looked up: one whose bit is set. The others have no depth, so that
+/// their integrals count for nothing; they may be those of an earlier block, which are finite.
 struct LookedUp {
   uint32_t touched;
+  bool finite = false;  // all integrals
   Row depth, scale;
   alignas(64) float integrals[4 * kLanes];  // of one pixel after the other
+
+  HWY_INLINE void integrate(const ShadingTable& table, const Intervals& intervals) {
+    if (!finite) clear(integrals);
+    finite = true;
+    integrateEach(table, intervals, touched, integrals);
+  }
 };
 
 /// The tables for looking pixels up: the integrals of the classification, and footprintPolynomial().
@@ -248,6 +256,7 @@ struct Tables {
 HWY_INLINE void showNearSides(const ShadingTable& table, const Intervals& nearer, LookedUp& out) {
   const Floats d;
   alignas(64) float integrals[4 * kLanes];
+  clear(integrals);
   integrateEach(table, nearer, out.touched, integrals);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     if (!anyOf(out.touched, lane)) continue;
@@ -282,7 +291,7 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Tables
              lane, nearer);
   }
   if (out.touched == 0) return false;
-  integrateEach(tables.shading, intervals, out.touched, out.integrals);
+  out.integrate(tables.shading, intervals);
   if (hides) showNearSides(tables.shading, nearer, out);
   return true;
 }

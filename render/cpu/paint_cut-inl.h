@@ -26,8 +26,31 @@ namespace hn = hwy::HWY_NAMESPACE;
 struct Faces {
   float at[ScreenCut::kFaces], by_p[ScreenCut::kFaces], by_q[ScreenCut::kFaces];
   bool far_side[ScreenCut::kFaces];
+  int count;                 // the first of them; the others cut nothing
   float mean_per_deviation;  // the scalar's, along the ray
 };
+
+struct alignas(16) FourFloats {
+  float of[4];
+};
+
+/// The same over a block: at its middle, and how far from that at its outermost pixels. The last is no face.
+struct BlockFaces {
+  FourFloats at, by_x, by_y, spread;
+
+  HWY_INLINE void set(const Faces& faces, const Ellipse& e) {
+    constexpr float kHalf = 0.5f * (kBlockSide - 1);
+    at = {ScreenCut::kNoFace, ScreenCut::kNoFace, ScreenCut::kNoFace, ScreenCut::kNoFace};
+    by_x = by_y = spread = {};
+    for (int n = 0; n < faces.count; ++n) {
+      by_x.of[n] = faces.by_p[n] * e.a + faces.by_q[n] * e.b;
+      by_y.of[n] = faces.by_q[n] * e.c;
+      spread.of[n] = kHalf * (std::abs(by_x.of[n]) + std::abs(by_y.of[n]));
+      at.of[n] = faces.at[n] + by_x.of[n] * (kHalf - e.x) + by_y.of[n] * (kHalf - e.y);
+    }
+  }
+};
+static_assert(ScreenCut::kFaces == 3);
 
 /// Integrals of the biweight's distribution from 0 to x, |x| <= 1: of 1, of -32/5 x, and of x².
 HWY_INLINE V massTo(V x, V x2) {
@@ -95,7 +118,7 @@ HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t la
   const Floats d;
   const Faces& faces = cuts.faces;
   V lo = hn::Set(d, -1.0f), hi = hn::Set(d, 1.0f);
-  for (int n = 0; n < ScreenCut::kFaces; ++n) {
+  for (int n = 0; n < faces.count; ++n) {
     const V a = hn::MulAdd(hn::Set(d, faces.by_p[n]), pixels.p,
                            hn::MulAdd(hn::Set(d, faces.by_q[n]), pixels.q, hn::Set(d, faces.at[n])));
     if (faces.far_side[n])
@@ -121,16 +144,17 @@ HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t la
 enum class Left { kNothing, kSome, kAll };
 
 /// Most blocks of a large splat lie wholly on one side of each face.
-HWY_INLINE Left leftIn(const Faces& faces, const Ellipse& e, Corner corner) {
-  constexpr float kHalf = 0.5f * (kBlockSide - 1), kSure = 1.001f;
-  const float dx = corner.x + kHalf - e.x, dy = corner.y + kHalf - e.y;
+HWY_INLINE Left leftIn(const BlockFaces& faces, Corner corner) {
+  const Four d;
+  const auto sure = hn::Set(d, 1.001f);
   bool all = true;
-  for (int n = 0; n < ScreenCut::kFaces; ++n) {
-    const float by_x = faces.by_p[n] * e.a + faces.by_q[n] * e.b, by_y = faces.by_q[n] * e.c;
-    const float middle = faces.at[n] + by_x * dx + by_y * dy;
-    const float half = kHalf * (std::abs(by_x) + std::abs(by_y));
-    if (middle + half < -kSure) return Left::kNothing;
-    all = all && middle - half > kSure;
+  for (size_t n = 0; n < 4; n += hn::Lanes(d)) {
+    const auto spread = hn::Load(d, faces.spread.of + n);
+    const auto at_left =
+        hn::MulAdd(hn::Load(d, faces.by_y.of + n), hn::Set(d, corner.y), hn::Load(d, faces.at.of + n));
+    const auto middle = hn::MulAdd(hn::Load(d, faces.by_x.of + n), hn::Set(d, corner.x), at_left);
+    if (!hn::AllFalse(d, hn::Lt(hn::Add(middle, spread), hn::Neg(sure)))) return Left::kNothing;
+    all = all && hn::AllTrue(d, hn::Gt(hn::Sub(middle, spread), sure));
   }
   return all ? Left::kAll : Left::kSome;
 }
@@ -208,7 +232,7 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
              hn::Sqrt(hn::Max(hn::Sub(width2, hn::Set(d, hidden2)), hn::Zero(d))), lane, nearer);
   }
   if (out.touched == 0) return false;
-  integrateEach(tables.shading, intervals, out.touched, out.integrals);
+  out.integrate(tables.shading, intervals);
   if (hides) showNearSides(tables.shading, nearer, out);
   return true;
 }
@@ -234,11 +258,14 @@ HWY_INLINE bool paintWindows(const TileWork& work, int block, const Paint& paint
 HWY_INLINE Faces facesOf(const ScreenSplat* record) {
   const ScreenCut cut = record ? ScreenCut::of(*record) : ScreenCut{};
   Faces faces;
+  faces.count = 0;
   for (size_t face = 0; face < ScreenCut::kFaces; ++face) {
     faces.at[face] = cut.faces[face][0] * (1 / ScreenCut::kReach);
     faces.by_p[face] = cut.faces[face][1] * (kSupport / ScreenCut::kReach);
     faces.by_q[face] = cut.faces[face][2] * (kSupport / ScreenCut::kReach);
     faces.far_side[face] = (cut.far_sides >> face & 1) != 0;
+    const auto& [at, by0, by1] = cut.faces[face];
+    if (at != ScreenCut::kNoFace || by0 != 0 || by1 != 0) faces.count = static_cast<int>(face) + 1;
   }
   faces.mean_per_deviation = cut.correlation;
   return faces;
@@ -256,6 +283,7 @@ struct CutSplat {
   Ellipse e;
   Scalar scalar;
   Faces faces;
+  BlockFaces block_faces;
   DepthLine line;
   CutShade shade;
   Lit lit;
@@ -272,6 +300,7 @@ HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number,
   out.e = visit.ellipse();
   out.lit = visit.all.lit(work, visit.n);
   out.faces = facesOf(records.cut);
+  out.block_faces.set(out.faces, out.e);
   out.line = depthLineOf(records.depth);
   if (records.depth) out.faces.mean_per_deviation = ScreenDepth::of(*records.depth).correlation;
   out.windowed = records.depth && work.windows;
@@ -292,7 +321,7 @@ HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float
                           LookedUp& out) {
   const Tables tables{work.table, footprint};
   const Corner corner = cornerOf(block);
-  const Left left = leftIn(cut.faces, cut.e, corner);
+  const Left left = leftIn(cut.block_faces, corner);
   if (left == Left::kNothing) return false;
   if (left == Left::kAll) return lookUpBlock(cut.e, cut.scalar, tables, corner, out);
   return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}}, tables, corner, out);
@@ -302,7 +331,7 @@ HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float
 HWY_NOINLINE bool paintCutBlock(const TileWork& work, const CutSplat& cut, const float* footprint,
                                 int block) {
   const Corner corner = cornerOf(block);
-  const Left left = leftIn(cut.faces, cut.e, corner);
+  const Left left = leftIn(cut.block_faces, corner);
   if (left == Left::kNothing) return false;
   const auto in_window = [&](float* at, const DepthWindow& window) HWY_ATTR {
     const Cuts cuts{cut.faces, cut.line, window};

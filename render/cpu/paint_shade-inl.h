@@ -60,10 +60,22 @@ HWY_INLINE V cellsOf(const ShadingTable& table, V scalar) {
   return hn::MulAdd(scalar, hn::Set(d, table.scale()), hn::Set(d, table.bias()));
 }
 
-HWY_INLINE hn::Vec<Ints> element(V x) {
+/// The element of the table that a place in cells is in, as a float.
+HWY_INLINE V elementAt(V x) {
   const Floats d;
   constexpr float kLast = ClassificationTable::kCells + 1;
-  return hn::ConvertTo(Ints(), hn::Clamp(hn::Add(x, hn::Set(d, 1.0f)), hn::Zero(d), hn::Set(d, kLast)));
+  return hn::Floor(hn::Clamp(hn::Add(x, hn::Set(d, 1.0f)), hn::Zero(d), hn::Set(d, kLast)));
+}
+
+/// The integer that a float is, from 0 to 2^23 - 1, by its bits: a conversion takes care of all that it may be.
+HWY_INLINE hn::Vec<Ints> integerOf(V x) {
+  const Floats d;
+  const V shift = hn::Set(d, 0x1p23f);
+  return hn::Sub(hn::BitCast(Ints(), hn::Add(x, shift)), hn::BitCast(Ints(), shift));
+}
+
+HWY_INLINE hn::Vec<Ints> element(V x) {
+  return integerOf(elementAt(x));
 }
 
 /// The intervals that pixels with these means see, in cells: never less than a cell. An interval beyond an
@@ -78,11 +90,11 @@ HWY_INLINE Range locate(const ShadingTable& table, V mean, V half_width, size_t 
   const V widen = hn::Max(hn::Zero(d), hn::Mul(half, hn::Sub(one, hn::Sub(to, from))));
   from = hn::Sub(from, widen);
   to = hn::Add(to, widen);
-  const auto i = element(from), j = element(to);
-  hn::Store(hn::ShiftLeft<3>(i), Ints(), out.from.at + lane);
-  hn::Store(hn::ShiftLeft<3>(j), Ints(), out.to.at + lane);
-  hn::Store(hn::Sub(hn::ConvertTo(d, i), from), d, out.first.at + lane);
-  hn::Store(hn::Sub(to, hn::Sub(hn::ConvertTo(d, j), one)), d, out.last.at + lane);
+  const V i = elementAt(from), j = elementAt(to);
+  hn::Store(hn::ShiftLeft<3>(integerOf(i)), Ints(), out.from.at + lane);
+  hn::Store(hn::ShiftLeft<3>(integerOf(j)), Ints(), out.to.at + lane);
+  hn::Store(hn::Sub(i, from), d, out.first.at + lane);
+  hn::Store(hn::Sub(to, hn::Sub(j, one)), d, out.last.at + lane);
   hn::Store(hn::Div(one, hn::Sub(to, from)), d, out.scale.at + lane);
   return {from, to};
 }
@@ -109,11 +121,15 @@ HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t
   std::fill(out + 4 * count, out + 4 * kLanes, 0.0f);
 }
 
-/// Integrates the intervals with a bit in `wanted` alone; the others are zero, too.
-HWY_INLINE void integrateEach(const ShadingTable& table, const Intervals& in, uint32_t wanted,
-                              float* HWY_RESTRICT out) {
+/// The integrals of no interval.
+HWY_INLINE void clear(float (&out)[4 * kLanes]) {
   const Floats d;
   for (size_t n = 0; n < 4 * kLanes; n += hn::Lanes(d)) hn::Store(hn::Zero(d), d, out + n);
+}
+
+/// Integrates the intervals with a bit in `wanted` alone; the others stay what they are.
+HWY_INLINE void integrateEach(const ShadingTable& table, const Intervals& in, uint32_t wanted,
+                              float* HWY_RESTRICT out) {
   for (; wanted != 0; wanted &= wanted - 1)
     integrateOne(table, in, static_cast<size_t>(std::countr_zero(wanted)), out);
 }

@@ -182,8 +182,6 @@ class Listed {
   /// Paints a part of an order tile's list in its block. Whether that is saturated then. Some are looked up before the
   /// first of them is blended: what was written as many narrow vectors is not ready at once to be read as a wide one.
   HWY_INLINE bool paint(const OrderList& list, int block) {
-    constexpr size_t kAtOnce = 8;
-    LookedUp looked_up[kAtOnce];
     bool found[kAtOnce];
     for (size_t begin = 0; begin < list.size(); begin += kAtOnce) {
       const OrderList some = list.subspan(begin, std::min(kAtOnce, list.size() - begin));
@@ -194,9 +192,9 @@ class Listed {
         if (n + 1 < some.size()) prefetch(places_[numberOf(some[n + 1])]);
         if (way == kPixels)
           found[n] = lookUpBlock(pixelwise_[at].e, pixelwise_[at].scalar, {work_->table, footprint_},
-                                 cornerOf(block), looked_up[n]);
+                                 cornerOf(block), looked_up_[n]);
         else if (way == kCutPixels)
-          found[n] = lookUpCut(*work_, cuts_[at], footprint_, block, looked_up[n]);
+          found[n] = lookUpCut(*work_, cuts_[at], footprint_, block, looked_up_[n]);
       }
       for (size_t n = 0; n < some.size();) {
         const Place place = places_[numberOf(some[n])];
@@ -204,7 +202,7 @@ class Listed {
           if (paintPlains(some, n, block)) return true;
         } else {
           const bool is_looked_up = place.way == kPixels || place.way == kCutPixels;
-          if (is_looked_up ? found[n] && paintFound(looked_up[n], place, block) : paintOther(place, block))
+          if (is_looked_up ? found[n] && paintFound(looked_up_[n], place, block) : paintOther(place, block))
             return true;
           ++n;
         }
@@ -227,6 +225,7 @@ class Listed {
   }
 
  private:
+  static constexpr size_t kAtOnce = 8;
   enum Way : uint32_t { kUnknown, kPlain, kPixels, kCutPixels, kCut, kColoured, kNoWay };
   /// The place of a splat's preparation: `at` counts in the vector of its way; of kColoured, in lanes of
   /// coloured_.
@@ -240,11 +239,16 @@ class Listed {
     Lit lit;
   };
 
+  template <typename Prepared>
+  static HWY_INLINE void prefetchAll(const Prepared& prepared) {
+    const auto* const at = reinterpret_cast<const std::byte*>(&prepared);
+    for (size_t line = 0; line < sizeof(Prepared); line += 64) hwy::Prefetch(at + line);
+  }
   HWY_INLINE void prefetch(Place place) const {
-    if (place.way != kPixels) return;
-    const auto* const at = reinterpret_cast<const std::byte*>(&pixelwise_[place.at]);
-    hwy::Prefetch(at);
-    hwy::Prefetch(at + 64);
+    if (place.way == kPixels)
+      prefetchAll(pixelwise_[place.at]);
+    else if (place.way == kCutPixels || place.way == kCut)
+      prefetchAll(cuts_[place.at]);
   }
   HWY_INLINE float* placeOf(int block) const { return work_->tile + block * kBlockFloats; }
 
@@ -335,6 +339,7 @@ class Listed {
   const TileWork* work_ = nullptr;
   const float* const footprint_ = footprintPolynomial();
   Prepared group_;
+  LookedUp looked_up_[kAtOnce];
   std::vector<Place> places_;  // [splat]
   std::vector<Plain> plains_;
   std::vector<PixelwiseSplat> pixelwise_;

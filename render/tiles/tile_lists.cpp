@@ -39,6 +39,32 @@ CURVISPLAT_VECTOR_CLONES void findColumns(const EllipseRows& rows, float first, 
   }
 }
 
+/// The faces of a splat over order tiles, as linear functions of their columns and rows: where one is below zero, its face
+/// leaves nothing.
+struct FaceRows {
+  float first[ScreenCut::kFaces], a_column[ScreenCut::kFaces], a_row[ScreenCut::kFaces];
+};
+
+CURVISPLAT_VECTOR_CLONES OrderTileMask findLeft(const FaceRows& faces, OrderTileMask tiles) {
+  OrderTileMask left = 0;
+  for (int row = 0; row < kOrderTilesAlong; ++row) {
+    if ((tiles >> row * kOrderTilesAlong & 0xff) == 0) continue;
+    const auto y = static_cast<float>(row);
+    uint32_t columns = 0;
+    for (int column = 0; column < kOrderTilesAlong; ++column) {
+      const auto x = static_cast<float>(column);
+      const float a = faces.first[0] + faces.a_column[0] * x + faces.a_row[0] * y;
+      const float b = faces.first[1] + faces.a_column[1] * x + faces.a_row[1] * y;
+      const float c = faces.first[2] + faces.a_column[2] * x + faces.a_row[2] * y;
+      const bool nothing = (a < 0) | (b < 0) | (c < 0);
+      columns |= static_cast<uint32_t>(!nothing) << column;
+    }
+    left |= OrderTileMask{columns} << row * kOrderTilesAlong;
+  }
+  return left & tiles;
+}
+static_assert(ScreenCut::kFaces == 3);
+
 }  // namespace
 
 OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat) {
@@ -59,6 +85,28 @@ OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat) {
   return tiles;
 }
 
+OrderTileMask tilesLeftOf(const TileCorner& tile, const ScreenSplat& splat, const ScreenCut& cut,
+                          OrderTileMask tiles) {
+  constexpr float kHalf = 0.5f * (kOrderSide - 1);     // from an order tile's middle to its outermost pixels
+  constexpr float kSure = 1.001f * ScreenCut::kReach;  // for rounding
+  const float inverse11 = 1 / splat.l11, inverse22 = 1 / splat.l22;
+  const float dx = tile.x + 0.5f + kHalf - splat.x, dy = tile.y + 0.5f + kHalf - splat.y;
+  FaceRows faces;
+  bool all = true;
+  for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
+    const auto& [at, by0, by1] = cut.faces[n];
+    const float by_y = by1 * inverse22, by_x = (by0 - splat.l21 * by_y) * inverse11;
+    const float most = at + kHalf * (std::abs(by_x) + std::abs(by_y)) + kSure;
+    faces.first[n] = most + by_x * dx + by_y * dy;
+    faces.a_column[n] = kOrderSide * by_x;
+    faces.a_row[n] = kOrderSide * by_y;
+    constexpr float kLast = kOrderTilesAlong - 1;
+    const float least = std::min(0.0f, kLast * faces.a_column[n]) + std::min(0.0f, kLast * faces.a_row[n]);
+    all = all && faces.first[n] + least >= 0;
+  }
+  return all ? tiles : findLeft(faces, tiles);
+}
+
 struct TileLists::Sorter {
   hwy::Sorter sort;
 };
@@ -70,16 +118,14 @@ TileLists::~TileLists() = default;
 void TileLists::begin(const TileCorner& tile) {
   tile_ = tile;
   order_.clear();
-  item_count_ = 0;
+  counts_.fill(0);
 }
 
 OrderTileMask TileLists::add(const ScreenSplat& splat, uint32_t number, OrderTileMask tiles, uint32_t front) {
   constexpr float kHalf = 0.5f * kOrderSide;
-  if (items_.size() < item_count_ + kOrderTiles) items_.resize(2 * items_.size() + kOrderTiles);
-  uint64_t* const begin = &items_[item_count_];
-  uint64_t* end = begin;
+  if (order_.size() == capacity_) makeSpace();
   const uint64_t index = order_.size();
-  OrderTileMask behind = 0;
+  OrderTileMask behind = 0, before = 0;
   for (; tiles != 0; tiles &= tiles - 1) {
     const auto tile = static_cast<uint32_t>(std::countr_zero(tiles));
     const uint32_t key =
@@ -87,22 +133,48 @@ OrderTileMask TileLists::add(const ScreenSplat& splat, uint32_t number, OrderTil
               tile_.y + static_cast<float>(tile / kOrderTilesAlong * kOrderSide) + kHalf);
     const bool is_behind = key > front;
     behind |= OrderTileMask{is_behind} << tile;
-    *end = (uint64_t{tile} << kItemKeyBits | key) << kItemNumberBits | index;
-    end += !is_behind;
+    before |= OrderTileMask{!is_behind} << tile;
+    items_[placeOf(tile) + counts_[tile]] = uint64_t{key} << kItemNumberBits | index;
+    counts_[tile] += !is_behind;
   }
-  if (end != begin) order_.push_back(number);
-  item_count_ += static_cast<size_t>(end - begin);
+  if (before != 0) order_.push_back(number);
   return behind;
 }
 
+/// Makes space for twice as many splats.
+void TileLists::makeSpace() {
+  constexpr size_t kFirst = 1024;
+  const size_t before = capacity_, more = std::max(kFirst, 2 * before);
+  // No list has more items than there are splats; the place behind its last is written as well.
+  auto items = std::make_unique_for_overwrite<uint64_t[]>(kOrderTiles * (more + kLine));
+  for (size_t tile = 0; tile < kOrderTiles; ++tile)
+    std::copy_n(&items_[tile * (before + kLine)], counts_[tile], &items[tile * (more + kLine)]);
+  items_ = std::move(items);
+  capacity_ = more;
+}
+
+/// Splats come by the first key that they have in any tile: many lists are sorted, or nearly so.
+void TileLists::sort(std::span<uint64_t> list) const {
+  constexpr size_t kFew = 12, kShare = 16;  // items; those that may come before their neighbour
+  size_t descents = 0;
+  for (size_t n = 1; n < list.size(); ++n) descents += list[n] < list[n - 1];
+  if (descents == 0) return;
+  size_t moves = list.size() <= kFew ? kFew * kFew : descents * kShare <= list.size() ? list.size() : 0;
+  for (size_t n = 1; n < list.size(); ++n) {
+    if (moves == 0) return sorter_->sort(list.data(), list.size(), hwy::SortAscending());
+    const uint64_t item = list[n];
+    size_t place = n;
+    for (; place > 0 && list[place - 1] > item; --place) list[place] = list[place - 1];
+    list[place] = item;
+    moves -= std::min(moves, n - place);
+  }
+}
+
 void TileLists::end() {
-  if (item_count_ > 1) sorter_->sort(items_.data(), item_count_, hwy::SortAscending());
-  size_t begin = 0;
   for (size_t tile = 0; tile < kOrderTiles; ++tile) {
-    size_t end = begin;
-    while (end < item_count_ && items_[end] >> (kItemKeyBits + kItemNumberBits) == tile) ++end;
-    lists_[tile] = {items_.data() + begin, end - begin};
-    begin = end;
+    const std::span<uint64_t> list(items_.get() + placeOf(tile), counts_[tile]);
+    sort(list);
+    lists_[tile] = list;
   }
 }
 

@@ -31,12 +31,15 @@ struct TileCorner {
 /// pixel of it.
 OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat);
 
-/// The splats of an order tile, in the order in which they are to be painted. Each is an item of three
-/// fields, from the top bit: the order tile (6 bits), the splat's key there (32), its index in
-/// TileLists::order() (26).
+/// Returns those of `tiles`, which the splat touches, in which its faces leave something of it.
+OrderTileMask tilesLeftOf(const TileCorner& tile, const ScreenSplat& splat, const ScreenCut& cut,
+                          OrderTileMask tiles);
+
+/// The splats of an order tile, in the order in which they are to be painted. Each is an item of two fields, from the
+/// top bit: the splat's key there, its index in TileLists::order() (26 bits).
 using OrderList = std::span<const uint64_t>;
 
-inline constexpr int kItemNumberBits = 26, kItemKeyBits = 32;
+inline constexpr int kItemNumberBits = 26;
 /// The index in TileLists::order() of an item of an OrderList.
 inline uint32_t numberOf(uint64_t item) {
   return item & ((1u << kItemNumberBits) - 1);
@@ -69,10 +72,18 @@ class TileLists {
  private:
   TileCorner tile_{};
   std::vector<uint32_t> order_;
+  void makeSpace();
+  void sort(std::span<uint64_t> list) const;
+  /// Returns where the list of an order tile begins in items_. Lists lie a cache line further apart than a power of two, or all
+  /// would compete for the same lines of the cache.
+  size_t placeOf(size_t tile) const { return tile * (capacity_ + kLine); }
+
+  static constexpr size_t kLine = 64 / sizeof(uint64_t);
   struct Sorter;
   const std::unique_ptr<Sorter> sorter_;
-  std::vector<uint64_t> items_;  // of the lists, the first item_count_; the others are space
-  size_t item_count_ = 0;
+  std::unique_ptr<uint64_t[]> items_;  // of the lists
+  size_t capacity_ = 0;                // of each list
+  std::array<uint32_t, kOrderTiles> counts_{};
   std::array<OrderList, kOrderTiles> lists_;
 };
 

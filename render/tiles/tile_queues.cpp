@@ -33,6 +33,17 @@ uint32_t recordsBefore(std::span<const ScreenSplat> splats, uint32_t splat) {
   return records;
 }
 
+/// The order tiles of `tiles`, which the splat touches, in which something is left of it; the records before it say what cuts it.
+OrderTileMask leftOf(const TileCorner& corner, const ScreenSplat* splat, OrderTileMask tiles) {
+  if (!hasCut(*splat) || tiles == 0) return tiles;
+  const ScreenSplat* const cut = SplatRecords::beside(splat, -1, isColour(splat[-1])).cut;
+  return cut ? tilesLeftOf(corner, *splat, ScreenCut::of(*cut), tiles) : tiles;
+}
+
+OrderTileMask tilesOf(const TileCorner& corner, const ScreenSplat* splat) {
+  return leftOf(corner, splat, orderTilesOf(corner, *splat));
+}
+
 // A tile's splats come from anywhere in the batch. Inlined by force: the compiler leaves out a call that only prefetches.
 constexpr size_t kAhead = 16;
 [[gnu::always_inline]] inline void prefetch(const TileQueues::New& added, size_t entry) {
@@ -70,7 +81,10 @@ class PartFilter {
     y_ = corner.y + static_cast<float>(square.row * kOrderSide) + half_;
   }
 
-  OrderTileMask tilesOf(const ScreenSplat& splat) const {
+  OrderTileMask tilesOf(const ScreenSplat& splat) const { return leftOf(corner_, &splat, touchedBy(splat)); }
+
+ private:
+  OrderTileMask touchedBy(const ScreenSplat& splat) const {
     // Most splats of a tile lie elsewhere; a rectangle around the ellipse, with a pixel's margin, says so.
     constexpr auto kSupport = static_cast<float>(kKernelSupport);
     const float reach = half_ + 1;
@@ -79,7 +93,6 @@ class PartFilter {
     return orderTilesOf(corner_, splat) & tiles_;
   }
 
- private:
   TileCorner corner_;
   OrderTileMask tiles_;
   float x_, y_, half_;  // the middle of the part, and half of its side
@@ -186,8 +199,8 @@ void TileQueues::list(const Queue& queue, const TileCorner& corner, std::vector<
       continue;
     }
     const OrderTileMask left = left_[place];
-    active.push_back({static_cast<uint32_t>(place), records,
-                      left == kUnknown ? orderTilesOf(corner, memory_[place]) : left});
+    active.push_back(
+        {static_cast<uint32_t>(place), records, left == kUnknown ? tilesOf(corner, &memory_[place]) : left});
     records = 0;
   }
 }
@@ -345,7 +358,7 @@ void TileQueues::paint(size_t number, const New& added, uint64_t open, const Pai
          ++next) {
       prefetch(added, next + kAhead);
       const ScreenSplat& splat = added.splats[entries[next]];
-      const OrderTileMask left = queue.isPart() ? filter.tilesOf(splat) : orderTilesOf(corner, splat);
+      const OrderTileMask left = queue.isPart() ? filter.tilesOf(splat) : tilesOf(corner, &splat);
       if (left == 0) continue;
       const auto active = append(queue, &splat, recordsBefore(added.splats, entries[next]), left);
       if (!active && round == 0) {

@@ -1,8 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/log_codes.h"
@@ -236,17 +239,33 @@ class GeometryEncoder {
                           : decodedVolume(n) * ratioTable()[steps_[n] + kLargestWeightCode];
   }
 
+  /// The splats whose weights come nearer to what they were if they are `more` steps larger: those first that gain most, of
+  /// equal ones the first.
+  std::vector<uint32_t> byGain(int more) const {
+    // The gain is rounded to 1/64 of a step, since equal cells differ by the rounding of their numbers. Half a step is the most
+    // that rounding has left.
+    constexpr uint32_t kParts = 64, kMost = kParts / 2, kNone = kMost + 1;
+    const auto gainOf = [&](size_t n) {
+      const double gain = (targets_[n] - steps_[n]) * more;
+      if (!(brick_.splats[n].weight > 0 && gain > 0)) return kNone;
+      return std::min(static_cast<uint32_t>(std::nearbyint(gain * kParts)), kMost);
+    };
+    std::vector<uint8_t> gains(count_);
+    std::array<uint32_t, kNone + 1> counts{}, places{};
+    for (size_t n = 0; n < count_; ++n) ++counts[gains[n] = static_cast<uint8_t>(gainOf(n))];
+    uint32_t place = 0;
+    for (uint32_t gain = kMost + 1; gain-- > 0;) places[gain] = std::exchange(place, place + counts[gain]);
+    std::vector<uint32_t> order(place);
+    for (uint32_t n = 0; n < count_; ++n)
+      if (gains[n] != kNone) order[places[gains[n]]++] = n;
+    return order;
+  }
+
   /// Rounds weights the other way until their sum lacks nothing: those first that change least by it, and of equal ones the
   /// first, so that codes stay in runs. Cells that are all alike have all been rounded in one direction.
   void spread(double missing) {
     const int more = missing > 0 ? 1 : -1;
-    std::vector<uint32_t> order;
-    for (uint32_t n = 0; n < count_; ++n)
-      if (brick_.splats[n].weight > 0 && (targets_[n] - steps_[n]) * more > 0) order.push_back(n);
-    // The gain is rounded to 1/64 of a step, since equal cells differ by the rounding of their numbers.
-    const auto gain = [&](uint32_t n) { return std::nearbyint((targets_[n] - steps_[n]) * more * 64); };
-    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return gain(a) > gain(b); });
-    for (const uint32_t n : order) {
+    for (const uint32_t n : byGain(more)) {
       const double before = decoded_.weight[n];
       steps_[n] += more;
       decoded_.weight[n] = decodedWeight(n);

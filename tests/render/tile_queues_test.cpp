@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <map>
 #include <random>
@@ -15,8 +16,21 @@ namespace {
 
 constexpr ImageSize kSize{100, 70};
 
-/// Splats in the order of their first keys; `mean` is the number. Some have a record before them, whose x is
-/// minus that.
+constexpr float kReach = ScreenCut::kReach;
+
+/// Makes between one and three faces, of which the first takes about half of the splat away.
+ScreenCut randomCut(std::mt19937& random) {
+  std::uniform_real_distribution<float> around(-1, 1);
+  ScreenCut cut;
+  for (size_t face = 0, faces = 1 + random() % 3; face < faces; ++face)
+    cut.faces[face] = {face == 0 ? around(random) : 3 + around(random), 4 * around(random),
+                       4 * around(random)};
+  cut.far_sides = random() % 8;
+  return cut;
+}
+
+/// Splats in the order of their first keys; `mean` is the number. Some are cut: their records before them have the number
+/// as their key. Some of these have a scalar of their own for their colours.
 std::vector<ScreenSplat> leaningSplats(int count, uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
@@ -44,9 +58,10 @@ std::vector<ScreenSplat> leaningSplats(int count, uint32_t seed) {
     splats[n].mean = static_cast<float>(n);
     if (n % 5 == 0) {
       splats[n].amplitude = -1;
-      ScreenSplat record = ScreenCut{}.record();
-      record.x = -static_cast<float>(n);
+      ScreenSplat record = randomCut(random).record();
+      record.key = static_cast<uint32_t>(n);
       with_records.push_back(record);
+      if (n % 2 == 0) with_records.push_back(ScreenColour{}.record());
     }
     with_records.push_back(splats[n]);
   }
@@ -59,8 +74,9 @@ using Orders = std::map<size_t, std::vector<int>>;
 void note(Orders& orders, size_t place, const ScreenSplat* splat) {
   const int number = static_cast<int>(splat->mean);
   if (number % 5 == 0) {
+    const ScreenSplat& cut = splat[number % 2 == 0 ? -2 : -1];
     ASSERT_TRUE(isRecord(splat[-1]));
-    ASSERT_EQ(splat[-1].x, static_cast<float>(-number));
+    ASSERT_EQ(cut.key, static_cast<uint32_t>(number));
   }
   orders[place].push_back(number);
 }
@@ -118,15 +134,40 @@ Orders ordersOf(TileQueues& queues, std::span<const ScreenSplat> splats, const s
   return orders;
 }
 
-/// Whether a pixel of the order tile with this first pixel has its centre in the splat's ellipse.
-bool touches(const ScreenSplat& splat, float x, float y) {
-  for (int pixel = 0; pixel < kOrderSide * kOrderSide; ++pixel) {
-    const float dx = x + static_cast<float>(pixel % kOrderSide) + 0.5f - splat.x;
-    const float dy = y + static_cast<float>(pixel / kOrderSide) + 0.5f - splat.y;
-    const float u = dx / splat.l11, v = (dy - splat.l21 * u) / splat.l22;
-    if (u * u + v * v < kKernelSupport * kKernelSupport) return true;
+/// Whether the faces leave an interval of the ray's depths at u.
+bool isLeftAt(const ScreenCut& cut, double u0, double u1) {
+  double lo = -kReach, hi = kReach;
+  for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
+    const double a = cut.faces[n][0] + cut.faces[n][1] * u0 + cut.faces[n][2] * u1;
+    if (cut.far_sides >> n & 1)
+      lo = std::max(lo, -a);
+    else
+      hi = std::min(hi, a);
   }
-  return false;
+  return lo < hi;
+}
+
+/// Calls visit(u0, u1) for the centre of each pixel of the order tile with this first pixel.
+template <typename Visit>
+void forPixels(const ScreenSplat& splat, float x, float y, const Visit& visit) {
+  for (int pixel = 0; pixel < kOrderSide * kOrderSide; ++pixel) {
+    const double dx = double{x} + pixel % kOrderSide + 0.5 - double{splat.x};
+    const double dy = double{y} + pixel / kOrderSide + 0.5 - double{splat.y};
+    const double u0 = dx / double{splat.l11};
+    visit(u0, (dy - double{splat.l21} * u0) / double{splat.l22});
+  }
+}
+
+/// Whether a pixel of the order tile with this first pixel has its centre in what is left of the splat's ellipse.
+bool touches(const ScreenSplat& splat, float x, float y) {
+  const ScreenSplat* const record =
+      SplatRecords::beside(&splat, -1, hasCut(splat) && isColour(*(&splat - 1))).cut;
+  const ScreenCut cut = record ? ScreenCut::of(*record) : ScreenCut{};
+  bool touched = false;
+  forPixels(splat, x, y, [&](double u0, double u1) {
+    touched |= u0 * u0 + u1 * u1 < double{kKernelSupport} * double{kKernelSupport} && isLeftAt(cut, u0, u1);
+  });
+  return touched;
 }
 
 /// The orders that a tile's list must have.
@@ -221,6 +262,72 @@ TEST(TileQueues, DivideNoTileWhereMemoryIsShort) {
   TileQueues few(kSize, 10000, 2), of_one_thread(kSize, size_t{1} << 18, 1);
   EXPECT_FALSE(divide(few, 0));
   EXPECT_FALSE(divide(of_one_thread, 0));
+}
+
+TEST(TileLists, LeaveOutOrderTilesOfWhichAFaceTakesAllPixels) {
+  std::mt19937 random(11);
+  const TileCorner corner{32, 64};
+  size_t left_tiles = 0, taken_tiles = 0;
+  for (ScreenSplat splat : leaningSplats(400, 5)) {
+    if (isRecord(splat)) continue;
+    splat.x = corner.x + static_cast<float>(random() % 32);
+    splat.y = corner.y + static_cast<float>(random() % 32);
+    const ScreenCut cut = randomCut(random);
+    const OrderTileMask touched = orderTilesOf(corner, splat),
+                        found = tilesLeftOf(corner, splat, cut, touched);
+    EXPECT_EQ(found & ~touched, 0u);
+    for (int tile = 0; tile < static_cast<int>(kOrderTiles); ++tile) {
+      if ((touched >> tile & 1) == 0) continue;
+      bool left = false;
+      std::array<bool, ScreenCut::kFaces> takes_all;
+      takes_all.fill(true);
+      forPixels(
+          splat, corner.x + static_cast<float>(tile % kOrderTilesAlong * kOrderSide),
+          corner.y + static_cast<float>(tile / kOrderTilesAlong * kOrderSide), [&](double u0, double u1) {
+            left |= isLeftAt(cut, u0, u1);
+            for (size_t n = 0; n < ScreenCut::kFaces; ++n)
+              takes_all[n] &= cut.faces[n][0] + cut.faces[n][1] * u0 + cut.faces[n][2] * u1 < -1.01 * kReach;
+          });
+      const bool taken = std::find(takes_all.begin(), takes_all.end(), true) != takes_all.end();
+      const bool is_found = (found >> tile & 1) != 0;
+      EXPECT_TRUE(is_found || !left);
+      EXPECT_FALSE(is_found && taken);
+      left_tiles += left;
+      taken_tiles += taken;
+    }
+  }
+  EXPECT_GT(left_tiles, 1000u);
+  EXPECT_GT(taken_tiles, 100u);
+}
+
+/// Lists of few and of many splats, which come in the order of their keys, nearly so, or in none.
+TEST(TileLists, SortEachListByKeysAndThenByOrder) {
+  TileLists lists;
+  const TileCorner corner{32, 32};
+  for (const uint32_t spread : {0u, 3u, 100000u})
+    for (const uint32_t count : {5u, 300u, 5000u}) {
+      std::mt19937 random(spread + count);
+      lists.begin(corner);
+      std::array<std::vector<std::tuple<uint32_t, uint32_t>>, kOrderTiles> wanted;
+      for (uint32_t n = 0; n < count; ++n) {
+        ScreenSplat splat{};
+        splat.x = splat.y = 48;
+        splat.key = 1000 + 2 * n + (spread == 0 ? 0 : random() % spread);
+        const OrderTileMask tiles = uint64_t{random()} << 32 | random();
+        const uint32_t front = 900000;
+        EXPECT_EQ(lists.add(splat, 7 * n, tiles, front), 0u);
+        for (size_t tile = 0; tile < kOrderTiles; ++tile)
+          if (tiles >> tile & 1) wanted[tile].emplace_back(splat.key, 7 * n);
+      }
+      lists.end();
+      for (size_t tile = 0; tile < kOrderTiles; ++tile) {
+        std::sort(wanted[tile].begin(), wanted[tile].end());
+        std::vector<std::tuple<uint32_t, uint32_t>> found;
+        for (const uint64_t item : lists.lists()[tile])
+          found.emplace_back(keyOf(item), lists.order()[numberOf(item)]);
+        EXPECT_EQ(found, wanted[tile]) << spread << ' ' << count << ' ' << tile;
+      }
+    }
 }
 
 TEST(TileQueues, SayWhenMoreWaitThanTheyHold) {
