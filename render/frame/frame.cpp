@@ -195,8 +195,9 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
                                         Progress* progress) {
   state_->pipeline.endPrefetch();
   bool is_final = false;
-  Image picture = state_->withBackends(
-      [&] { return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, {progress}); });
+  Image picture = state_->withBackends([&] {
+    return state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, {progress});
+  });
   show(picture, is_final);
   if (is_final) return;
   picture = Image();
@@ -207,8 +208,9 @@ Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& opt
                                    const QuickLimits& limits, FrameStatistics& statistics, bool& is_final,
                                    std::shared_ptr<CardPicture>* on_card) {
   state_->pipeline.endPrefetch();
-  return state_->withBackends(
-      [&] { return state_->renderQuickly(camera, options, limits, statistics, is_final, {nullptr, on_card}); });
+  return state_->withBackends([&] {
+    return state_->renderQuickly(camera, options, limits, statistics, is_final, {nullptr, on_card});
+  });
 }
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {

@@ -104,12 +104,10 @@ CardBricks::Room CardBricks::roomFor(std::span<const StoredPart> parts, uint64_t
     now += drawn;
     most = std::max(most, now);
     // Slabs share what lies at the depth where one ends, up to `most`. With no more space than that, dozens of them would be
-    // needed; so there is more, and fewer bricks where memory is short. A buffer has no more space with fewer bricks: there a
-    // third of each slab has to be new.
-    const uint64_t few = most + all / kSlabs, slab = std::min(all, few),
-                   in_buffer = std::min(slab, most + most / 2);
+    // needed; so there is more, and fewer bricks where memory is short. A buffer has no more space with fewer bricks.
+    const uint64_t slab = std::min(all, most + all / kSlabs);
     // The painter needs a part of the buffer of splats for those that are drawn beside the stored ones.
-    if (pages > granted_bytes_ || 2 * in_buffer > largest_ || pages + slab > bytes) break;
+    if (pages > granted_bytes_ || 2 * most > largest_ || pages + slab > bytes) break;
     room = {room.parts + 1, pages, std::min({all, largest_ / 2, bytes - pages})};
   }
   return room;
