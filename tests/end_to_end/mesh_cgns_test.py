@@ -148,6 +148,20 @@ class CgnsMeshes(MeshFormats):
         self.assertTrue(any("cell-centred fields" in w for w in warnings), warnings)
         self.expect_same([self.path], mesh.vtk(), {"c": None})
 
+    def test_a_mixed_section_of_faces_alone(self):
+        """Its elements are no cells of the zone, whose values remain those of all cells."""
+        mesh = Mesh()
+        wall = [cg.QUAD_4, *(mesh.cells[0][:4] + 1)]
+        words, begins = self.mixed(mesh)
+        with cg.CgnsFile(self.path) as file:
+            file.base()
+            file.zone("Cube", mesh.points, len(mesh.cells))
+            file.section("shells", cg.MIXED, np.array(wall + wall), 2, np.array([0, 5, 10]))
+            file.section("all", cg.MIXED, words, len(mesh.cells), begins)
+            self.finish(file, mesh)
+        self.assertEqual(self.info(self.path)["cells"]["count"], len(mesh.cells))
+        self.expect_same([self.path], mesh.vtk())
+
     def test_polyhedra(self):
         mesh = Mesh()
         self.expect_same([self.path], mesh.vtk(self.write_polyhedra(mesh, parents=False)))
