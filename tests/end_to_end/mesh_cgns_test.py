@@ -106,6 +106,21 @@ class CgnsMeshes(MeshFormats):
                 self.assertTrue(any("Walls" in note for note in info["notes"]), info["notes"])
                 self.expect_same([self.path], mesh.vtk())
 
+    def test_adf_of_version_b(self):
+        """Its header has binary pointers, of either byte order."""
+        mesh = Mesh()
+        self.write_sections(mesh, cg.ADF)
+        for layout in ("IEEE_LITTLE_64", "IEEE_LITTLE_32", "IEEE_BIG_64"):
+            with self.subTest(layout=layout):
+                path = self.folder / f"{layout}.cgns"
+                cg.copy_adf(self.path, path, layout)
+                whole = path.read_bytes()
+                self.assertIn(b"Version B", whole[:32])
+                self.expect_same([path], mesh.vtk())
+                path.write_bytes(whole[:-4096])
+                said = self.run_program("info", path).stderr
+                self.assertIn(f"is truncated (found {len(whole) - 4096} bytes, expected", said)
+
     def test_numbers_of_elements_of_every_version(self):
         """CGNS 3.0 counted PYRA_13 between PYRA_5 and PYRA_14: HEXA_8 was 18, MIXED 21. Polygons of MIXED were 21 or 22 and their nodes."""
         import h5py
