@@ -121,6 +121,19 @@ class CgnsMeshes(MeshFormats):
                 said = self.run_program("info", path).stderr
                 self.assertIn(f"is truncated (found {len(whole) - 4096} bytes, expected", said)
 
+    def test_bases_of_the_same_zones_are_said(self):
+        """They may be time steps, as CFX writes them; others are parts of one grid."""
+        mesh = Mesh()
+        for names, zones, said in ((("Base 0", "Base 2", "Base 4"), ("piston",) * 3, True), (("Rotor", "Stator"), ("rotor", "stator"), False)):
+            with cg.CgnsFile(self.path) as file:
+                for base, zone in zip(names, zones):
+                    file.base(base)
+                    file.zone(zone, mesh.points, len(mesh.cells))
+                    file.section("all", cg.MIXED, self.mixed(mesh)[0], len(mesh.cells), self.mixed(mesh)[1])
+            warnings = " ".join(self.info(self.path)["warnings"])
+            self.assertEqual("3 bases have the same zones (Base 0, Base 2, Base 4), and all of them are read" in warnings, said, warnings)
+            self.assertEqual("bases" in warnings, said, warnings)
+
     def test_numbers_of_elements_of_every_version(self):
         """CGNS 3.0 counted PYRA_13 between PYRA_5 and PYRA_14: HEXA_8 was 18, MIXED 21. Polygons of MIXED were 21 or 22 and their nodes."""
         import h5py
