@@ -127,6 +127,20 @@ class Columns(ModelFileTest):
         self.globe(2e5)
         self.assertNotIn("below the sphere", " ".join(self.info()["warnings"]))
 
+    def test_structured_cells_far_below_the_sphere(self):
+        """The corners' mean of the cells beside the equator, which are the widest."""
+        depth = 6371 * (1 - np.cos(np.radians(10)) * np.cos(np.radians(5)))
+        for scale, said in ((0.5, True), (500, False)):
+            with File(self.folder / "file.nc", {"lon": 5, "lat": 4, "alt": 3}) as f:
+                f.add("lon", "lon", 20.0 * np.arange(5), units="degrees_east")
+                f.add("lat", "lat", -15.0 + 10 * np.arange(4), units="degrees_north")
+                f.add("alt", "alt", scale * np.arange(3.0) ** 2, units="km", standard_name="altitude")
+                f.add("T", "alt lat lon", np.ones((3, 4, 5)), "f4")
+            warning = f"lie up to {depth:.3g} km below the sphere, {depth / 0.5:.3g} times the thickness"
+            self.assertEqual(warning in " ".join(self.info()["warnings"]), said)
+            self.assertNotIn("below the sphere", " ".join(self.info("file.nc", "--flat")["warnings"]))
+            self.assertNotIn("below the sphere", " ".join(self.info("file.nc", "--vertical-scale", "1000")["warnings"]))
+
     def test_thicknesses_of_layers(self):
         """MPAS' ocean: below the surface, which is not at 0; below the ground there are none."""
         thickness = np.array([[1.0, 3, 6, 10], [1, 4, 0, 0]])

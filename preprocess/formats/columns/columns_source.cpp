@@ -270,14 +270,8 @@ void ColumnsSource::noteSagitta() {
     }
     if (const double depth = 1 - glm::length(sum) / count; depth > deepest) deepest = depth;
   });
-  const double sagitta = globe_.radius_km * deepest, thickness = globe_.vertical_scale * thinnestLayer();
-  if (!(thickness > 0 && 2 * sagitta > thickness)) return;
-  description_.warnings.push_back(
-      fmt::format("cells are flat, and their middles lie up to {:.3g} km below the sphere, {:.3g} times the "
-                  "thickness of the "
-                  "thinnest layer: there splats of one layer lie among those of others, and values mix; "
-                  "--flat keeps layers apart",
-                  sagitta, sagitta / thickness));
+  std::string warning = warningOfSagitta(globe_.radius_km * deepest, globe_.vertical_scale * thinnestLayer());
+  if (!warning.empty()) description_.warnings.push_back(std::move(warning));
 }
 
 std::vector<double> ColumnsSource::readAngles(const NetcdfVariable& variable, uint64_t first,
