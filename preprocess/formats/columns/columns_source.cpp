@@ -62,7 +62,8 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
   findTimes(options);
   const std::string unit = lowerCase(map_.longitude->text("units"));
   const auto length = kilometresOf(unit);
-  const bool radians = unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID");
+  const bool radians =
+      unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID" && map_.format != "FESOM");
   const bool plane = length.has_value() || map_.longitude->name == "xVertex";
   to_degrees_ = plane ? length.value_or(1e-3) : radians ? 180 / std::numbers::pi : 1;
   globe_ = globeWith(options.globe, !plane, 0.0);

@@ -118,6 +118,8 @@ std::string nearestToGrid(const NetcdfFiles& file) {
     text +=
         ", the cells of an unstructured map: give the grid file that has their faces after it (ICON's "
         "icon_grid.nc, MPAS' or UGRID's mesh)";
+  if (std::ranges::any_of(dims, [](const std::string& dim) { return dim == "nod2" || dim == "elem"; }))
+    text += ", the points or cells of FESOM: give its mesh file (fesom.mesh.diag.nc) after it";
   return text;
 }
 
