@@ -25,6 +25,15 @@ bool isInRanges(const std::vector<std::vector<float>>& values, size_t sample,
   return true;
 }
 
+/// `values`: [sample * ranges.size() + scalar], of a cell's corners or of the cell.
+bool areInRanges(std::span<const float> values, std::span<const ValueRange> ranges) {
+  for (size_t n = 0; n < values.size(); ++n) {
+    const ValueRange& range = ranges[n % ranges.size()];
+    if (!(values[n] >= range.lower && values[n] <= range.upper)) return false;
+  }
+  return true;
+}
+
 /// A box of a block's nodes, read.
 class NodesOfBox {
  public:
@@ -287,10 +296,13 @@ std::vector<std::optional<SourceValues>> probeMesh(const MeshSource& source,
         if (found[p]) return;
         const auto weights = weightsInCell(cell.shape, cell.corners, cell.faces, points[p]);
         if (!weights) return;
+        // Interpolated values are not compared: rounding takes those of a constant beyond its one value.
+        const std::span<const float> of_cell(some.cell_values.data() + (cells ? n * scalars.size() : 0),
+                                             cells ? scalars.size() : 0);
+        if (!areInRanges(cells ? of_cell : cell.values, ranges)) return;
         SourceValues values{0, {some.numbers[n], 0, 0}, box.middle, {}, {}};
         if (cells) {
-          const auto first = some.cell_values.begin() + static_cast<ptrdiff_t>(n * scalars.size());
-          values.sample.assign(first, first + static_cast<ptrdiff_t>(scalars.size()));
+          values.sample.assign(of_cell.begin(), of_cell.end());
           values.values.assign(values.sample.begin(), values.sample.end());
         } else {
           const auto nearest =
@@ -305,8 +317,6 @@ std::vector<std::optional<SourceValues>> probeMesh(const MeshSource& source,
             values.sample.push_back(cell.values[nearest * scalars.size() + v]);
           }
         }
-        for (size_t v = 0; v < scalars.size(); ++v)
-          if (!(values.values[v] >= ranges[v].lower && values.values[v] <= ranges[v].upper)) return;
         found[p] = std::move(values);
       });
     }

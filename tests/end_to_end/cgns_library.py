@@ -15,6 +15,50 @@ def library():
     return name and ctypes.CDLL(name)
 
 
+def copy_adf(path, to, layout):
+    """The same nodes in a file of ADF's version B, whose pointers are binary: `layout` is IEEE_LITTLE_64, IEEE_BIG_64 ..."""
+    lib, error = library(), ctypes.c_int()
+    number, text, sizes = ctypes.c_int(), ctypes.create_string_buffer(64), (ctypes.c_int * 12)()
+
+    def call(function, *words):
+        getattr(lib, function)(*words, ctypes.byref(error))
+        return error.value == -1
+
+    def need(*words):
+        if not call(*words):
+            raise RuntimeError(f"{words[0]}: {error.value}")
+
+    def copy(node, twin):
+        need("ADF_Number_of_Children", node, ctypes.byref(number))
+        names = ctypes.create_string_buffer(33 * number.value + 1)
+        count = number.value
+        if count:
+            need("ADF_Children_Names", node, 1, count, 32, ctypes.byref(number), names)
+        for n in range(count):
+            name = names.raw[33 * n:33 * n + 32].split(b"\0")[0]
+            child, other = ctypes.c_double(), ctypes.c_double()
+            need("ADF_Get_Node_ID", node, name, ctypes.byref(child))
+            need("ADF_Create", twin, name, ctypes.byref(other))
+            need("ADF_Get_Label", child, text)
+            need("ADF_Set_Label", other, text)
+            need("ADF_Get_Data_Type", child, text)
+            if text.value[:2] != b"MT":
+                need("ADF_Get_Number_of_Dimensions", child, ctypes.byref(number))
+                need("ADF_Get_Dimension_Values", child, sizes)
+                data = ctypes.create_string_buffer(8 * int(np.prod(sizes[:number.value])))
+                need("ADF_Read_All_Data", child, data)
+                need("ADF_Put_Dimension_Information", other, text, number.value, sizes)
+                need("ADF_Write_All_Data", other, data)
+            copy(child, other)
+
+    one, two = ctypes.c_double(), ctypes.c_double()
+    need("ADF_Database_Open", str(path).encode(), b"READ_ONLY", b"", ctypes.byref(one))
+    need("ADF_Database_Open", str(to).encode(), b"NEW", layout.encode(), ctypes.byref(two))
+    copy(one, two)
+    need("ADF_Database_Close", one)
+    need("ADF_Database_Close", two)
+
+
 class CgnsFile:
     """with CgnsFile(path) as file: file.base(); file.zone(...); ..."""
 

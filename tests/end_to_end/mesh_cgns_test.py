@@ -106,6 +106,34 @@ class CgnsMeshes(MeshFormats):
                 self.assertTrue(any("Walls" in note for note in info["notes"]), info["notes"])
                 self.expect_same([self.path], mesh.vtk())
 
+    def test_adf_of_version_b(self):
+        """Its header has binary pointers, of either byte order."""
+        mesh = Mesh()
+        self.write_sections(mesh, cg.ADF)
+        for layout in ("IEEE_LITTLE_64", "IEEE_LITTLE_32", "IEEE_BIG_64"):
+            with self.subTest(layout=layout):
+                path = self.folder / f"{layout}.cgns"
+                cg.copy_adf(self.path, path, layout)
+                whole = path.read_bytes()
+                self.assertIn(b"Version B", whole[:32])
+                self.expect_same([path], mesh.vtk())
+                path.write_bytes(whole[:-4096])
+                said = self.run_program("info", path).stderr
+                self.assertIn(f"is truncated (found {len(whole) - 4096} bytes, expected", said)
+
+    def test_bases_of_the_same_zones_are_said(self):
+        """They may be time steps, as CFX writes them; others are parts of one grid."""
+        mesh = Mesh()
+        for names, zones, said in ((("Base 0", "Base 2", "Base 4"), ("piston",) * 3, True), (("Rotor", "Stator"), ("rotor", "stator"), False)):
+            with cg.CgnsFile(self.path) as file:
+                for base, zone in zip(names, zones):
+                    file.base(base)
+                    file.zone(zone, mesh.points, len(mesh.cells))
+                    file.section("all", cg.MIXED, self.mixed(mesh)[0], len(mesh.cells), self.mixed(mesh)[1])
+            warnings = " ".join(self.info(self.path)["warnings"])
+            self.assertEqual("3 bases have the same zones (Base 0, Base 2, Base 4), and all of them are read" in warnings, said, warnings)
+            self.assertEqual("bases" in warnings, said, warnings)
+
     def test_numbers_of_elements_of_every_version(self):
         """CGNS 3.0 counted PYRA_13 between PYRA_5 and PYRA_14: HEXA_8 was 18, MIXED 21. Polygons of MIXED were 21 or 22 and their nodes."""
         import h5py
@@ -147,6 +175,20 @@ class CgnsMeshes(MeshFormats):
         self.assertTrue(any("3 elements are nodes, lines or faces" in w for w in warnings), warnings)
         self.assertTrue(any("cell-centred fields" in w for w in warnings), warnings)
         self.expect_same([self.path], mesh.vtk(), {"c": None})
+
+    def test_a_mixed_section_of_faces_alone(self):
+        """Its elements are no cells of the zone, whose values remain those of all cells."""
+        mesh = Mesh()
+        wall = [cg.QUAD_4, *(mesh.cells[0][:4] + 1)]
+        words, begins = self.mixed(mesh)
+        with cg.CgnsFile(self.path) as file:
+            file.base()
+            file.zone("Cube", mesh.points, len(mesh.cells))
+            file.section("shells", cg.MIXED, np.array(wall + wall), 2, np.array([0, 5, 10]))
+            file.section("all", cg.MIXED, words, len(mesh.cells), begins)
+            self.finish(file, mesh)
+        self.assertEqual(self.info(self.path)["cells"]["count"], len(mesh.cells))
+        self.expect_same([self.path], mesh.vtk())
 
     def test_polyhedra(self):
         mesh = Mesh()

@@ -5,6 +5,7 @@ EnSight Gold, structured and unstructured: mesh_formats.py says how. Exit status
 """
 import copy
 import ctypes
+import json
 import unittest
 
 from sweep import IS_WHOLE, some_of
@@ -130,6 +131,18 @@ class EnsightCases(MeshFormats):
                 self.expect_same([self.path], self.as_written(mesh, order).vtk(), options=("--time-step", "1"))
                 mesh.p /= 2
                 mesh.c /= 2
+
+    def test_exact_values_without_the_name_of_the_case(self):
+        """Nor with the number of the step."""
+        mesh = self.rounded(Mesh())
+        self.write(mesh)
+        for step, factor in (("0", 1), ("1", 2)):
+            cache = self.convert([self.path], "c", "--time-step", step)
+            for n in (0, len(mesh.cells) - 1):
+                at = ",".join(map(str, mesh.points[mesh.cells[n]].mean(0)))
+                told = self.run_program("info", cache, f"--probe={at}", "--source", "--json")
+                self.assertEqual(told.returncode, 0, told.stderr)
+                self.assertAlmostEqual(json.loads(told.stdout)["probe"]["values"][0]["value"], factor * mesh.c[n], places=4)
 
     def file_set(self, mesh, order, sizes_differ, with_c_binary=False):
         """Both steps of each file in one, as Ansys' solvers and Code_Aster write them."""

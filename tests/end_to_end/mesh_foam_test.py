@@ -146,6 +146,18 @@ class MeshFoam(MeshCase):
                     self.assertEqual(block.GetNumberOfCells(), 64)
                     np.testing.assert_allclose(vtk_to_numpy(block.GetCellData().GetArray("p")), p, rtol=1e-6)
 
+    def test_exact_values_without_the_name_of_the_case(self):
+        for how in ({}, {"packed": True}, {"parts": 2}):
+            with self.subTest(**how):
+                case, p, _ = self.foam_case(**how)
+                at = ",".join(map(str, lattice(4)[hexahedra(4)[5]].mean(0)))
+                for step, added in (("0", 0), ("1", 0.5)):
+                    cache = self.convert([case], "p", "--time-step", step)
+                    told = self.run_program("info", cache, f"--probe={at}", "--source", "--json")
+                    self.assertEqual(told.returncode, 0, told.stderr)
+                    value = json.loads(told.stdout)["probe"]["values"][0]["value"]
+                    self.assertAlmostEqual(value, p[5] + added, places=5)
+
     def test_openfoam_times_and_moving_meshes(self):
         case, p, _ = self.foam_case()
         result = self.run_program("info", case, "--json", "--time-step", "1")

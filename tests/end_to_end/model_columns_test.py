@@ -99,6 +99,37 @@ class Columns(ModelFileTest):
             self.field(f, "face", "layer")
         self.expect("zCoordinates", "out2d_1.nc", "temperature_1.nc", "zCoordinates_1.nc")
 
+    def test_fesom_without_attributes(self):
+        """Its mesh files were once without those of UGRID, and without units; outputs have points or layers first."""
+        nodes = {"nod2": 5, "elem": 4, "n3": 3, "nz": 4, "nz1": 3, "time": None}
+        with File(self.folder / "fesom.mesh.diag.nc", nodes) as f:
+            f.add("lon", "nod2", [0.0, 2, 2, 0, 1])
+            f.add("lat", "nod2", [-1.0, -1, 1, 1, 0])
+            f.add("elements", "n3 elem", np.array([[1, 2, 5], [2, 3, 5], [3, 4, 5], [4, 1, 5]]).T, "i4")
+            f.add("nz", "nz", [0.0, -100, -300, -600])
+            f.add("nz1", "nz1", [-50.0, -200, -450])
+            f.add("nlevels", "elem", [4, 4, 4, 4], "i4")
+            f.add("nlevels_nod2D", "nod2", [4] * 5, "i4")
+            f.add("nod_area", "nz nod2", np.ones((4, 5)))
+        with File(self.folder / "u.nc", nodes) as f:
+            f.add("u", "time nz1 elem", np.ones((1, 3, 4)), "f4")
+        with File(self.folder / "temp.nc", nodes) as f:
+            f.add("temp", "time nod2 nz1", np.ones((1, 5, 3)), "f4")
+        with File(self.folder / "sst.nc", nodes) as f:
+            f.add("sst", "time nod2", np.ones((1, 5)), "f4")
+        degree = np.pi / 180 * 6371
+        for name, depth in (("u", 0.6), ("temp", 0.4)):
+            cache = self.folder / "a.splats"
+            subprocess.run([PROGRAM, "convert", self.folder / f"{name}.nc", self.folder / "fesom.mesh.diag.nc", "-o", cache, "--flat",
+                            "--scalar", name, "--overwrite"], check=True, capture_output=True)
+            self.assertAlmostEqual(json.loads((cache / "manifest.json").read_text())["volume"] / (4 * degree**2 * depth), 1, delta=1e-4)
+        self.assertIn("give its mesh file (fesom.mesh.diag.nc) after it", self.info("temp.nc", fails=True))
+        self.assertIn("left out: sst, without layers", " ".join(self.info("sst.nc", "fesom.mesh.diag.nc")["warnings"]))
+        self.assertNotIn("left out", " ".join(self.info("temp.nc", "fesom.mesh.diag.nc")["warnings"]))
+        refused = subprocess.run([PROGRAM, "convert", self.folder / "sst.nc", self.folder / "fesom.mesh.diag.nc", "-o", cache, "--overwrite",
+                                  "--scalar", "sst"], check=False, capture_output=True, text=True)
+        self.assertIn("sst has no layers, and so no volume", refused.stderr)
+
     def globe(self, scale):
         """Eight faces of 45 x 20 degrees around the Earth, the fourth across the date line; layers of 10 m and more, times `scale`."""
         with File(self.folder / "file.nc", {"node": 16, "face": 8, "corner": 4, "layer": 4, "interface": 5, "time": None}) as f:
@@ -126,6 +157,20 @@ class Columns(ModelFileTest):
         self.assertIn(f"lie up to {depth:.3g} km below the sphere, {depth / 0.01:.3g} times the thickness", " ".join(self.info()["warnings"]))
         self.globe(2e5)
         self.assertNotIn("below the sphere", " ".join(self.info()["warnings"]))
+
+    def test_structured_cells_far_below_the_sphere(self):
+        """The corners' mean of the cells beside the equator, which are the widest."""
+        depth = 6371 * (1 - np.cos(np.radians(10)) * np.cos(np.radians(5)))
+        for scale, said in ((0.5, True), (500, False)):
+            with File(self.folder / "file.nc", {"lon": 5, "lat": 4, "alt": 3}) as f:
+                f.add("lon", "lon", 20.0 * np.arange(5), units="degrees_east")
+                f.add("lat", "lat", -15.0 + 10 * np.arange(4), units="degrees_north")
+                f.add("alt", "alt", scale * np.arange(3.0) ** 2, units="km", standard_name="altitude")
+                f.add("T", "alt lat lon", np.ones((3, 4, 5)), "f4")
+            warning = f"lie up to {depth:.3g} km below the sphere, {depth / 0.5:.3g} times the thickness"
+            self.assertEqual(warning in " ".join(self.info()["warnings"]), said)
+            self.assertNotIn("below the sphere", " ".join(self.info("file.nc", "--flat")["warnings"]))
+            self.assertNotIn("below the sphere", " ".join(self.info("file.nc", "--vertical-scale", "1000")["warnings"]))
 
     def test_thicknesses_of_layers(self):
         """MPAS' ocean: below the surface, which is not at 0; below the ground there are none."""

@@ -10,6 +10,11 @@ import unittest
 from model_files import PROGRAM, RADIUS, RANDOM, ModelFileTest, np, sphere, standard_altitude
 
 
+def besides_bends(info):
+    """The warnings but that of coarse cells on the sphere."""
+    return [warning for warning in info["warnings"] if "below the sphere" not in warning]
+
+
 class ModelDialects(ModelFileTest):
     def test_pop_has_two_sets_of_points_on_the_same_dimensions(self):
         """With a displaced pole: coordinates are of two dimensions, and a variable names those of its points."""
@@ -192,7 +197,7 @@ class Levels(ModelFileTest):
                 ("depth", [0, 10, 20, 40], sea, {"positive": "up", "standard_name": "depth"}, "depth is positive up, but is a depth")):
             self.levels(name, values, lambda f: field and f["T"].setncattr("standard_name", field), units="m", **attributes)
             info = self.expect_heights(-1e-3 * np.array(values))
-            self.assertEqual(len(info["warnings"]), words is not None)
+            self.assertEqual(len(besides_bends(info)), words is not None)
             self.assertIn(words or "", "".join(info["warnings"]))
         for attributes in ({"long_name": "height above ground level"}, {"standard_name": "height"}, {"long_name": "height above the bottom"}):
             self.levels("lev", [5, 50, 500, 5000], lambda f: f["T"].setncattr("standard_name", sea), units="m", **attributes)
@@ -234,7 +239,7 @@ class Levels(ModelFileTest):
         def more(f):
             f.add("Z", "k", z, units="m", positive="up", standard_name="depth")
         self.levels("k", np.arange(4), more, axis="Z", standard_name="z_grid_index", long_name="z-dimension of the t grid")
-        self.assertEqual(self.expect_heights(1e-3 * np.array(z))["warnings"], [])
+        self.assertEqual(besides_bends(self.expect_heights(1e-3 * np.array(z))), [])
         for name, attributes in (("k", {"axis": "Z", "standard_name": "z_grid_index"}), ("height", {"standard_name": "height", "long_name": "generalized_height", "axis": "Z"})):
             self.levels(name, np.arange(4), **attributes)
             self.assertIn(f"{name} numbers the levels; expected a length or a pressure: give heights", self.info(fails=True))
@@ -305,7 +310,7 @@ class Levels(ModelFileTest):
             for name, values in (("hyam", [0.02, 0.1, 0.2, 0]), ("hybm", [0, 0.05, 0.3, 1])):
                 f.add(name, "lev", values)
         self.levels("lev", [20.0, 150, 500, 1000], more, units="hPa", positive="down")
-        self.assertEqual(self.info()["warnings"], ["there are hyam and hybm, but no surface pressure (ps); the nominal pressures are taken"])
+        self.assertEqual(besides_bends(self.info()), ["there are hyam and hybm, but no surface pressure (ps); the nominal pressures are taken"])
 
     def test_terms_that_are_attributes_of_the_file(self):
         """CROCO's sc_r, Cs_r and hc. What a formula lacks is named, not a unit that makes metres of it."""

@@ -65,6 +65,13 @@ class OddScalars(MeshCase):
                         + "\n".join(" ".join(map(repr, map(float, row))) for row in rows) + "\n")
         return path
 
+    def test_the_value_of_a_constant_is_short(self):
+        """0.4 in single precision is 0.4000000059604645, and -0 is 0."""
+        for value, text in ((np.float32(0.4), "c is 0.4 everywhere"), (-0.0, "c is 0 everywhere")):
+            self.values = np.full(60, value, "f4")
+            drawn = self.run_program("render", self.write_vtk(True), "-o", self.folder / "p.png", "--size", "40x40")
+            self.assertIn(text, drawn.stdout + drawn.stderr)
+
     def test_values_too_small_for_single_precision(self):
         warning = "c: its values are smaller than 1.2e-38 in magnitude, too small for single precision"
         for sign in (1, -1):

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -76,6 +77,32 @@ TEST(SourceProbe, AnswersInMeshesOfSeveralPieces) {
   }
   EXPECT_FALSE(probeMesh(mesh, kFirst, std::vector<ValueRange>{{100, 200}}, points, folder.path())[1])
       << "values that are not in the cache";
+}
+
+TEST(SourceProbe, AnswersInMeshesWhereValuesAreConstant) {
+  // Weights that do not add up to 1 to the last bit take 285 beyond the one value that there is.
+  const auto scene = makeScene("half-annulus");
+  ArrayPiece piece = tetrahedraOf(*scene, 6, 4, 4);
+  setValues(piece, [](const glm::dvec3&) { return 285.0; });
+  std::vector<glm::dvec3> points;
+  constexpr std::array kWeights{0.71, 0.17, 0.09, 0.03};
+  for (size_t cell = 0; cell < piece.cells.size(); ++cell) {
+    const auto corners = piece.cells.cornersOfCell(cell);
+    glm::dvec3 inside(0.0);
+    for (size_t c = 0; c < 4; ++c) inside += kWeights[c] * piece.points[corners[c]];
+    points.push_back(inside);
+  }
+  const TemporaryFolder folder;
+  const std::vector<ValueRange> only{{285, 285}};
+  const auto found = probeMesh(ArrayMesh({piece}), kFirst, only, points, folder.path());
+  size_t rounded = 0;
+  for (size_t p = 0; p < points.size(); ++p) {
+    ASSERT_TRUE(found[p]) << p;
+    EXPECT_NEAR(found[p]->values[0], 285, 1e-10);
+    EXPECT_EQ(found[p]->sample[0], 285);
+    rounded += found[p]->values[0] != 285;
+  }
+  EXPECT_GT(rounded, 0u);
 }
 
 TEST(SourceProbe, AnswersWithTheCellsOwnValue) {

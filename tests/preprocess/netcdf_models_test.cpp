@@ -102,7 +102,7 @@ TEST_P(NetcdfModels, TheGridIsThatOfTheScalarWanted) {
   EXPECT_TRUE(description.blocks[0].has_blanking);
   ASSERT_EQ(description.scalars.size(), 2u);
   EXPECT_EQ(description.scalars[0].unit, "unit");
-  ASSERT_EQ(description.warnings.size(), 3u);
+  ASSERT_GE(description.warnings.size(), 3u);  // and one of coarse cells on the sphere
   expectSays(description.warnings[0], "u, on another grid (xi_u, eta_u, s_rho)");
   EXPECT_EQ(open({"U"})->description().blocks.at(0).ni, roms::kXi - 1);
   EXPECT_EQ(open({"jacobian"})->description().blocks.at(0).ni, roms::kXi);

@@ -276,7 +276,8 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
   FunctionParts parts = data().function(arguments.transfer_function.value_or(""), maps_);
   TransferFunctionDefinition definition = parts.definition();
   if (isNearlyConstant(info()))
-    definition.notes.push_back(fmt::format("{} is {} everywhere, or nearly so{}", info().name, info().min,
+    definition.notes.push_back(fmt::format("{} is {} everywhere, or nearly so{}", info().name,
+                                           numberText(info().min + 0.0),  // not -0
                                            adviceOnConstant(cache_, what_)));
   if (!arguments.transfer_function) add("--tf", parts.map);
   add("--range", exact(parts.range.first) + "," + exact(parts.range.second));

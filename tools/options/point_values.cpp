@@ -4,6 +4,8 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 
@@ -59,6 +61,63 @@ std::vector<uint32_t> scalarsLike(const CacheReader& reader, const GridDescripti
   return scalars;
 }
 
+/// Sets how longitude and latitude became positions as the cache has it, unless the options say.
+void setGlobe(const Manifest& manifest, GlobeOptions& options) {
+  if (!manifest.globe || options.shape != GlobeOptions::Shape::kAutomatic) return;
+  const Globe& globe = *manifest.globe;
+  if (globe.degrees())
+    options.shape = globe.sphere() ? GlobeOptions::Shape::kSphere : GlobeOptions::Shape::kFlat;
+  options.radius_km = globe.radius_km;
+  options.vertical_scale = globe.vertical_scale;
+}
+
+/// The time step of the files whose time the cache has, if it is another one than was opened and none was asked for.
+std::optional<uint32_t> otherStep(const Manifest& manifest, const GridDescription& description,
+                                  const OpenGridOptions& options) {
+  const std::vector<double>& times = description.times;
+  const double time = manifest.steps.front().time;
+  if (options.time_step || times.size() < 2 || std::ranges::count(times, time) != 1) return std::nullopt;
+  const auto step = static_cast<uint32_t>(std::ranges::find(times, time) - times.begin());
+  if (step == description.time_step) return std::nullopt;
+  return step;
+}
+
+bool describesAll(const Manifest& manifest, OpenGridOptions options, const std::vector<fs::path>& files) {
+  try {
+    std::unique_ptr<DataSource> source = openData(options);
+    if (const auto step = otherStep(manifest, source->description(), options)) {
+      options.time_step = step;
+      source = openData(options);
+    }
+    const auto plain = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
+    std::set<fs::path> named;
+    for (const std::string& file : source->description().files) named.insert(plain(file));
+    return std::ranges::all_of(files, [&](const fs::path& file) { return named.contains(plain(file)); });
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+/// Sets the files of a grid: the one that names all the others, or the folder that is a case, if `files` have one;
+/// else all of them.
+void setFiles(const Manifest& manifest, const std::vector<fs::path>& files, OpenGridOptions& grid) {
+  std::vector<fs::path> candidates;
+  if (files.size() > 1) {
+    candidates.push_back(files.front());
+    for (fs::path folder = fs::absolute(files.front()).parent_path(); folder.has_relative_path();
+         folder = folder.parent_path())
+      if (isGridFolder(folder)) candidates.push_back(folder);
+  }
+  for (const fs::path& one : candidates) {
+    grid.grid = one;
+    if (describesAll(manifest, grid, files)) return;
+  }
+  grid.grid = files.front();
+  grid.solutions.assign(files.begin() + 1, files.end());
+}
+
 /// `found`: what the cache has there.
 std::vector<std::optional<SourceValues>> sourceValues(const CacheReader& reader, const PointSource& from,
                                                       std::span<const glm::dvec3> points,
@@ -98,6 +157,8 @@ void setSource(const CacheReader& reader, const std::vector<fs::path>& files, Op
   if (found.empty())
     throw Error("{}: the files that it was made from are no longer there; name them after --source",
                 reader.cachePath().string());
+  setGlobe(reader.manifest(), grid.globe);
+  if (files.empty()) return setFiles(reader.manifest(), found, grid);
   grid.grid = found.front();
   grid.solutions.assign(found.begin() + 1, found.end());
 }
@@ -109,7 +170,12 @@ OpenSource openSource(const CacheReader& reader, const PointSource& source) {
     options.scalars.push_back(variable.name);
     opened.ranges.push_back({variable.min, variable.max});
   }
-  opened.grid = openWithDerived(options, {source.gas, std::nullopt});
+  const DerivedOptions derived{source.gas, std::nullopt};
+  opened.grid = openWithDerived(options, derived);
+  if (const auto step = otherStep(reader.manifest(), opened.grid->description(), options)) {
+    options.time_step = step;
+    opened.grid = openWithDerived(options, derived);
+  }
   const GridDescription& description = opened.grid->description();
   opened.scalars = scalarsLike(reader, description, source.grid);
   if (dynamic_cast<const MeshSource*>(opened.grid.get()))

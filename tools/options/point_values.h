@@ -21,8 +21,9 @@ namespace curvisplat {
 /// one is missing.
 std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std::filesystem::path& cache);
 
-/// Sets the files of `grid`: `files`, or those that the cache names, if there are none. Throws Error if one of these is
-/// missing, or if they are those of a series, of which the step's have to be given.
+/// Sets the files of `grid`: `files`, or those that the cache names, if there are none; of these the one that names the others, or
+/// their case. Sets the globe as the cache has it, unless the options say. Throws Error if one of the files is missing, or if they
+/// are those of a series, of which the step's have to be given.
 void setSource(const CacheReader& reader, const std::vector<std::filesystem::path>& files,
                OpenGridOptions& grid);
 

@@ -54,10 +54,9 @@ CgnsCells::CgnsCells(const CgnsFile& file, const CgnsZone& zone, const ListSpool
       first_point_.push_back(first_point_.back() + section.connectivity.count);
       continue;
     }
+    const uint64_t before = counts_.solid;
     countCells(section);
-    const bool solid =
-        section.type == kCgnsMixed || section.type == kCgnsNface || section.kind().cell != CellKind::kNone;
-    if (!solid) continue;
+    if (counts_.solid == before) continue;  // a surface: values in cells have none for its elements
     runs_.push_back({&section, cells_, section.elements});
     cells_ += section.elements;
   }

@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <set>
+#include <string>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "preprocess/formats/cgns/cgns_patches.h"
 #include "preprocess/formats/cgns/cgns_solutions.h"
@@ -63,6 +67,7 @@ class TreeReader {
   void readFamilyType(const CgnsNode& family);
   std::string familyType(const CgnsNode& condition, const Nodes& details) const;
   void writeNotes();
+  void warnOfEqualBases();
   void warnOfOmissions();
 
   const CgnsFile& file_;
@@ -95,6 +100,7 @@ CgnsTree TreeReader::read() {
   chosenTimeStep(file_.path().string(), tree_.times, step_);
   chooseZones();
   warnOfOmissions();
+  warnOfEqualBases();
   writeNotes();
   return std::move(tree_);
 }
@@ -386,6 +392,25 @@ void TreeReader::chooseZones() {
   std::set<std::string> bases;
   for (const CgnsZone& zone : tree_.zones) bases.insert(zone.base);
   tree_.bases = bases.size();
+}
+
+/// Warns of bases that may be states of one grid, which CGNS writes as steps of one base (BaseIterativeData_t).
+void TreeReader::warnOfEqualBases() {
+  using Sizes = std::tuple<std::string, std::array<uint64_t, 3>, uint64_t>;
+  std::map<std::string, std::vector<Sizes>> zones_of;
+  for (const CgnsZone& zone : tree_.zones)
+    zones_of[zone.base].emplace_back(zone.name, zone.nodes, zone.cells);
+  std::map<std::vector<Sizes>, std::vector<std::string>> bases_of;
+  for (const CgnsZone& zone : tree_.zones) {
+    std::vector<std::string>& bases = bases_of[zones_of[zone.base]];
+    if (std::ranges::find(bases, zone.base) == bases.end()) bases.push_back(zone.base);
+  }
+  for (const auto& [zones, bases] : bases_of)
+    if (bases.size() > 1)
+      tree_.warnings.push_back(fmt::format(
+          "{} bases have the same zones ({}), and all of them are read: if they are time steps, their "
+          "values are mixed; write each base to a file of its own",
+          bases.size(), listed(bases, kNamesListed)));
 }
 
 void TreeReader::warnOfOmissions() {

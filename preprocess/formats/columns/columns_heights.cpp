@@ -6,6 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
@@ -79,6 +82,18 @@ std::vector<double> levelsOf(const NetcdfFiles& file, const NetcdfVariable& coor
   }
   const std::vector<double> estimated = around(middles), stored = storedLevels(file, estimated);
   return stored.empty() ? estimated : stored;
+}
+
+/// The levels of FESOM's mesh file, which has no units: metres, upwards or downwards. Empty if it has none.
+std::vector<double> levelsOfFesom(const NetcdfFiles& file, const std::string& name, uint64_t count) {
+  const NetcdfVariable* const variable = file.find(name);
+  if (!variable || !variable->numeric || variable->dims.size() != 1 || !variable->text("units").empty() ||
+      file.dimension(*variable, 0).length != count)
+    return {};
+  std::vector<double> levels(count);
+  file.read(*variable, {{0}, {count}}, std::span(levels));
+  for (double& level : levels) level = -1e-3 * std::abs(level);
+  return levels;
 }
 
 bool hasWords(const std::string& text, std::string_view part) {
@@ -196,6 +211,11 @@ ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map
     if (auto found = heightsOn(file, block, axesOf(block, scalars, step), reason)) return std::move(*found);
   ColumnsHeights heights;
   const std::string& name = file.dimensions()[scalars.layer_dim].name;
+  if (map.format == "FESOM") {
+    heights.words = between ? "nz" : name;
+    heights.levels = levelsOfFesom(file, heights.words, levels);
+    if (!heights.levels.empty()) return heights;
+  }
   for (const NetcdfVariable& variable : file.variables()) {
     if (variable.dims != std::vector{scalars.layer_dim} || !variable.numeric) continue;
     if (variable.name == "refBottomDepth" && between) {

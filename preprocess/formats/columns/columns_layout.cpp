@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <string_view>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
@@ -90,6 +91,14 @@ ColumnsMap ugridOf(const NetcdfFiles& file, const NetcdfVariable& topology) {
   return map;
 }
 
+/// The triangles of FESOM's mesh file as it was before it had the attributes of UGRID; null if it is none.
+const NetcdfVariable* fesomElements(const NetcdfFiles& file) {
+  const NetcdfVariable* const elements = file.find("elements");
+  const auto elem = dimensionNamed(file, "elem");
+  return elements && elem && hasDimension(*elements, *elem) && file.find("nlevels_nod2D") ? elements
+                                                                                          : nullptr;
+}
+
 }  // namespace
 
 bool hasDimension(const NetcdfVariable& variable, size_t dim) {
@@ -121,6 +130,13 @@ std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file) {
     map.face_dim = on_cell->dims[0];
   } else if (topology) {
     map = ugridOf(file, *topology);
+  } else if (const NetcdfVariable* const elements = fesomElements(file)) {
+    map.format = "FESOM";
+    map.nodes_of_face = elements;
+    map.first_node = 1;
+    map.longitude = &required(file, "lon", map.format);
+    map.latitude = &required(file, "lat", map.format);
+    map.face_dim = *dimensionNamed(file, "elem");
   } else {
     return std::nullopt;
   }
@@ -131,6 +147,7 @@ std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file) {
 ColumnsBottom findColumnsBottom(const NetcdfFiles& file, const ColumnsMap& map,
                                 const ColumnsScalars& scalars) {
   const bool cells = scalars.centring == Centring::kCell;
+  const std::string_view format_of_map = map.format == "FESOM" ? "UGRID" : std::string_view(map.format);
   const auto levels = dimensionNamed(file, "nz");
   const bool between = levels && file.dimensions()[*levels].length == scalars.layers + 1;
   const struct {
@@ -142,7 +159,7 @@ ColumnsBottom findColumnsBottom(const NetcdfFiles& file, const ColumnsMap& map,
                {"UGRID", "nlevels_nod2D", false, between ? 1.0 : 0.0}};
   for (const auto& [format, name, of_cells, surplus] : known) {
     const NetcdfVariable* const found = file.find(name);
-    if (found && map.format == format && of_cells == cells && found->numeric &&
+    if (found && format_of_map == format && of_cells == cells && found->numeric &&
         found->dims == std::vector{cells ? map.face_dim : map.node_dim})
       return {found, surplus};
   }

@@ -4,6 +4,7 @@
 //    UGRID  face_node_connectivity of a mesh_topology   heights of faces or nodes, a formula, or the layers' coordinate
 //    ICON   vertex_of_cell, vlon, vlat (grid file)      z_ifc, z_mc, or the coordinate of the layers
 //    MPAS   verticesOnCell, nEdgesOnCell, lonVertex     zgrid, zMid, refBottomDepth, or layerThickness
+//    FESOM  elements, lon, lat (mesh file, without UGRID's attributes)   nz, nz1, in metres
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ namespace curvisplat {
 
 /// Sizes are indices of dimensions in NetcdfFiles::dimensions().
 struct ColumnsMap {
-  std::string format;  // "UGRID", "ICON", "MPAS"
+  std::string format;  // "UGRID", "ICON", "MPAS", "FESOM"
   const NetcdfVariable* nodes_of_face = nullptr;
   const NetcdfVariable* sides = nullptr;  // of MPAS: how many nodes each face has
   double first_node = 0;                  // the number of the first node

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <iterator>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "preprocess/formats/columns/columns_heights.h"
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "stream/base/error.h"
+#include "stream/base/name_list.h"
 
 namespace curvisplat {
 namespace {
@@ -25,12 +28,34 @@ bool isOfMapAlone(std::string_view dimension) {
   return std::find(std::begin(kNames), std::end(kNames), dimension) != std::end(kNames);
 }
 
+using Variables = std::vector<const NetcdfVariable*>;
+
+/// Fields over the map without layers, which have no volume. Says that they are left out where nothing else of their file is read,
+/// since they are what its user wants to see. Throws Error if one of them is wanted.
+void leaveOutFlat(const NetcdfFiles& file, const Variables& flat, const std::vector<ColumnsScalars>& groups,
+                  const std::vector<std::string>& wanted, std::vector<std::string>& warnings) {
+  std::vector<std::string> names;
+  for (const NetcdfVariable* const one : flat) {
+    if (std::ranges::find(wanted, one->name) != wanted.end())
+      throw Error("{}: {} has no layers, and so no volume that can be drawn; choose another scalar",
+                  file.paths().at(one->file), one->name);
+    const bool is_read = std::ranges::any_of(groups, [&](const ColumnsScalars& group) {
+      return std::ranges::any_of(group.variables, [&](const auto* v) { return v->file == one->file; });
+    });
+    if (!is_read) names.push_back(one->name);
+  }
+  if (!names.empty())
+    warnings.push_back(fmt::format("left out: {}, without layers, and so without a volume that can be drawn",
+                                   listed(names, 3)));
+}
+
 }  // namespace
 
 ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& map,
                                     const std::vector<std::string>& wanted,
                                     std::vector<std::string>& warnings) {
   std::vector<ColumnsScalars> groups;
+  Variables flat;
   for (const NetcdfVariable& variable : file.variables()) {
     if (!variable.numeric || !variable.text("cf_role").empty()) continue;
     const bool faces = hasDimension(variable, map.face_dim);
@@ -53,6 +78,7 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     if (isHeightsOfColumns(file, variable)) continue;
     if (others.size() == 1 && isOfMapAlone(file.dimensions()[others[0]].name)) continue;
     const uint64_t layers = others.size() == 1 ? file.dimensions()[others[0]].length : 0;
+    if (others.empty() && time && &variable != map.nodes_of_face) flat.push_back(&variable);
     if (layers < 2 || layers > kMaxColumnsLevels || &variable == map.nodes_of_face) continue;
     const Centring centring = faces ? Centring::kCell : Centring::kNode;
     auto group = std::find_if(groups.begin(), groups.end(), [&](const ColumnsScalars& g) {
@@ -67,6 +93,7 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     }
     group->variables.push_back(&variable);
   }
+  leaveOutFlat(file, flat, groups, wanted, warnings);
   // Thicknesses come last, since they are seldom the scalar of interest.
   for (ColumnsScalars& group : groups)
     std::stable_partition(group.variables.begin(), group.variables.end(),

@@ -62,7 +62,8 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
   findTimes(options);
   const std::string unit = lowerCase(map_.longitude->text("units"));
   const auto length = kilometresOf(unit);
-  const bool radians = unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID");
+  const bool radians =
+      unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID" && map_.format != "FESOM");
   const bool plane = length.has_value() || map_.longitude->name == "xVertex";
   to_degrees_ = plane ? length.value_or(1e-3) : radians ? 180 / std::numbers::pi : 1;
   globe_ = globeWith(options.globe, !plane, 0.0);
@@ -270,14 +271,8 @@ void ColumnsSource::noteSagitta() {
     }
     if (const double depth = 1 - glm::length(sum) / count; depth > deepest) deepest = depth;
   });
-  const double sagitta = globe_.radius_km * deepest, thickness = globe_.vertical_scale * thinnestLayer();
-  if (!(thickness > 0 && 2 * sagitta > thickness)) return;
-  description_.warnings.push_back(fmt::format(
-      "cells are flat, and their middles lie up to {:.3g} km below the sphere, {:.3g} times the "
-      "thickness of the "
-      "thinnest layer: there splats of one layer cross those of others, and an opaque picture shows deeper "
-      "ones; --flat keeps layers apart",
-      sagitta, sagitta / thickness));
+  std::string warning = warningOfSagitta(globe_.radius_km * deepest, globe_.vertical_scale * thinnestLayer());
+  if (!warning.empty()) description_.warnings.push_back(std::move(warning));
 }
 
 std::vector<double> ColumnsSource::readAngles(const NetcdfVariable& variable, uint64_t first,

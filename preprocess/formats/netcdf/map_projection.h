@@ -48,4 +48,8 @@ class MapProjection {
 /// map, in degrees.
 Globe globeWith(const GlobeOptions& options, bool degrees, double middle_longitude);
 
+/// A line for users if cells on the sphere bend by more than their layers are thick; else empty. `sagitta_km`: how far the
+/// middle of a flat cell lies below the sphere at most. `thickness_km`: of the thinnest layer, as it is drawn.
+std::string warningOfSagitta(double sagitta_km, double thickness_km);
+
 }  // namespace curvisplat

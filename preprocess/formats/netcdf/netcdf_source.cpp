@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <glm/geometric.hpp>
+#include <limits>
 #include <map>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/closed_grid.h"
@@ -115,6 +118,8 @@ std::string nearestToGrid(const NetcdfFiles& file) {
     text +=
         ", the cells of an unstructured map: give the grid file that has their faces after it (ICON's "
         "icon_grid.nc, MPAS' or UGRID's mesh)";
+  if (std::ranges::any_of(dims, [](const std::string& dim) { return dim == "nod2" || dim == "elem"; }))
+    text += ", the points or cells of FESOM: give its mesh file (fesom.mesh.diag.nc) after it";
   return text;
 }
 
@@ -273,11 +278,61 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   if (grid_.dims.time)
     description_.format +=
         fmt::format(", time step {} of {}", description_.time_step, description_.times.size());
+  if (std::string warning = noteOnSagitta(); !warning.empty())
+    description_.warnings.push_back(std::move(warning));
   if (const double share = shareOfZeros(); share > 0)
     description_.warnings.push_back(
         fmt::format("{} is exactly 0 at {:.0f} % of the nodes, at all levels, which may be land; --blank 0 "
                     "leaves these out",
                     grid_.variables[mask_]->name, 100 * share));
+}
+
+/// How far the middle of a cell of the first level lies below the sphere at most, in radii. A cell is as flat as its corners'
+/// mean.
+double NetcdfSource::deepestCell(const CfNodes& block) const {
+  const uint64_t ni = description_.blocks[0].ni, nj = description_.blocks[0].nj;
+  const std::vector<glm::dvec3> points = block.points({{}, {ni, nj, 1}});
+  double deepest = 0;
+  for (uint64_t j = 0; j + 1 < nj; ++j)
+    for (size_t n = j * ni; n + 1 < (j + 1) * ni; ++n) {
+      const glm::dvec3 middle = 0.25 * (points[n] + points[n + 1] + points[n + ni] + points[n + ni + 1]);
+      if (const double depth = 1 - glm::length(middle); depth > deepest) deepest = depth;
+    }
+  return deepest;
+}
+
+/// The least mean thickness of a layer in the block's middle row, as drawn, in kilometres; infinite if there is none.
+double NetcdfSource::thinnestLayer(const CfNodes& block) const {
+  const uint64_t ni = description_.blocks[0].ni, nj = description_.blocks[0].nj,
+                 nk = description_.blocks[0].nk;
+  NodeArrays nodes;
+  block.read({{0, nj / 2, 0}, {ni, nj / 2 + 1, nk}}, {}, nodes);
+  const auto radius = [&](size_t n) { return glm::length(glm::dvec3(nodes.x[n], nodes.y[n], nodes.z[n])); };
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (uint64_t k = 0; k + 1 < nk; ++k) {
+    double sum = 0, count = 0;
+    for (size_t n = k * ni; n < (k + 1) * ni; ++n) {
+      const double thickness = std::abs(radius(n + ni) - radius(n));
+      if (!(thickness > 0)) continue;  // below the ground
+      sum += thickness;
+      ++count;
+    }
+    if (count > 0) thinnest = std::min(thinnest, sum / count);
+  }
+  return thinnest;
+}
+
+std::string NetcdfSource::noteOnSagitta() const {
+  // Cells of more columns are smaller than 20 km, and lie less than 10 m below the sphere.
+  constexpr uint64_t kMaxColumns = 1 << 21;
+  const GridBlock& block = description_.blocks[0];
+  if (!onSphere() || block.nk < 2 || block.ni * block.nj * blocks_.size() > kMaxColumns) return "";
+  double deepest = 0, thinnest = std::numeric_limits<double>::infinity();
+  for (const CfNodes& nodes : blocks_) {
+    deepest = std::max(deepest, deepestCell(nodes));
+    thinnest = std::min(thinnest, thinnestLayer(nodes));
+  }
+  return warningOfSagitta(globe_.radius_km * deepest, thinnest);
 }
 
 /// Detects a file that marks land by zeros alone: the share of columns that are 0 at the first, middle and

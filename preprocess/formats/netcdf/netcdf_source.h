@@ -50,6 +50,9 @@ class NetcdfSource final : public FaceSource {
   Globe globeOf(const GlobeOptions& options) const;
   void describe(const OpenGridOptions& options);
   double shareOfZeros() const;
+  double deepestCell(const CfNodes& block) const;
+  double thinnestLayer(const CfNodes& block) const;
+  std::string noteOnSagitta() const;
 
   NetcdfFiles file_;
   GridDescription description_;

@@ -284,7 +284,7 @@ void FoamSource::findFields() {
       description_.warnings.push_back(fmt::format("{}; {} is left out", error.what(), name));
       continue;
     }
-    description_.files.push_back(path.string());
+    description_.files.push_back(file->name());
     addField(name, components);
     const auto regions = static_cast<size_t>(std::ranges::count_if(pieces_, [&](const Piece& piece) {
       return piece.folder == pieces_.front().folder && piece.processor == pieces_.front().processor;
