@@ -280,6 +280,25 @@ class MeshFoam(MeshCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("2 steps", result.stdout)
 
+    def test_fields_that_not_all_times_have(self):
+        """As usual: what only the initial time has, or some of the later ones, is left out of a series that names no scalar."""
+        case, p, _ = self.foam_case()
+        writer = FoamCase(case)
+        for time in ("1", "2"):
+            for name in ("p", "T"):
+                writer.write_field(case / time, name, p + float(time))
+        writer.write_field(case / "0", "epsilon", p)
+        for time in ("0", "0.5", "2"):
+            writer.write_field(case / time, "nut", p)
+        for steps, kept in (("all", ["T", "p"]), ("0:3:3", ["T", "nut", "p"])):
+            result = self.run_program("convert", case, "--steps", steps, "-o", self.folder / "s.splats", "--overwrite")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("left out: ", result.stderr)
+            manifest = self.manifest(self.folder / "s.splats")
+            self.assertEqual(sorted(variable["name"] for variable in manifest["variables"]), kept)
+        result = self.run_program("convert", case, "--steps", "all", "--scalar", "epsilon", "-o", self.folder / "s.splats", "--overwrite")
+        self.assertIn("has no scalar 'epsilon'", result.stderr)
+
     def test_regions(self):
         """As chtMultiRegionFoam: two cubes side by side, of which one alone has U."""
         def write(where):

@@ -181,7 +181,7 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
   options.convert.precision = precision;
-  const SeriesInput input = seriesInput(arguments, steps);
+  const SeriesInput input = seriesInput(arguments, steps, steps);
   makePreviewOfFirstStep(input, optionsFor(output, title), progress, events);
   convertSeries(input, options, progress, [&](const SeriesEvent& event) {
     if (!event.converted) return;
