@@ -65,6 +65,16 @@ class Messages(FormatCase):
         self.assertEqual(self.info(self.folder / "a.dat")["nodes"], 8)
 
     @unittest.skipUnless(importlib.util.find_spec("h5py"), "no h5py")
+    def test_a_grid_alone_is_drawn_by_what_is_computed_from_it(self):
+        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
+        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
+        grid = self.write("alone.xyz", f"1\n{NI} {NJ} {NK}\n" + "".join(numbers(POINTS[..., axis]) for axis in range(3)))
+        picture = ("-o", self.folder / "a.png", "--size", "20x20")
+        self.assertIn("choose a derived one with --scalar", self.run_program("render", grid, *picture).stderr)
+        for scalar in ("volume", "jacobian"):  # the second is added to the cache of the first
+            result = self.run_program("render", grid, "--scalar", scalar, *picture)
+            self.assertEqual((result.returncode, scalar in result.stdout), (0, True), result.stderr)
+
     def test_names_of_hdf5_files_that_are_not_read(self):
         import h5py
         for group, words in (("ENS_MAA/mesh", "a MED file"), ("settings", "a Fluent case"), ("_silolibinfo", "a Silo file"), ("sim info", "of FLASH"), ("tstt", "a MOAB mesh")):

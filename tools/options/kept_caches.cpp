@@ -343,7 +343,7 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
     const MakingLock lock(place / "used", progress);
     removeChanged(place, cache);
     if (!fs::exists(cache / "manifest.json", error)) {
-      makeKeptCache(files, cache, progress, events, precision);
+      makeKeptCache(files, cache, progress, events, scalars, precision);
       if (const StampedFiles now(files, progress);
           now.all() != stamped.all() || now.stamps() != stamped.stamps()) {
         writeFileDurably(place / kChanged, "");
