@@ -57,6 +57,11 @@ class Messages(FormatCase):
                 result = self.run_program("info", self.write(name, text))
                 self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
                 self.assertIn(words, result.stderr)
+        case = self.write("case/system/controlDict", "FoamFile\n{\n}\n").parent.parent
+        for path, command in ((case, "info"), (self.write("case/case.foam", ""), "info"), (case, "render"), (case, "convert")):
+            result = self.run_program(command, path, *([] if command == "info" else ["-o", self.folder / ("a.png" if command == "render" else "a.splats")]))
+            self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
+            self.assertIn("an OpenFOAM case without a mesh", result.stderr)
         for name, words in (("plt00010/Header", "a plotfile of AMReX"), ("sim.bp/md.idx", "an ADIOS2 file")):
             (self.folder / "plt00010" / "Level_0").mkdir(parents=True, exist_ok=True)
             self.assertIn(words, self.run_program("info", self.write(name, "x").parent).stderr)
@@ -87,7 +92,7 @@ class Messages(FormatCase):
 
     def write(self, name, text):
         path = self.folder / name
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
         return path
 
