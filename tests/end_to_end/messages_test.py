@@ -51,6 +51,10 @@ class Messages(FormatCase):
                  "c.nc": ("netcdf x {\ndimensions:\n\tlon = 4 ;\n}\n", "ncgen"), "a.mesh": ("MFEM mesh v1.0\n\ndimension\n3\n", "an MFEM mesh"),
                  "a.dx": ("object 1 class gridpositions counts 2 2 2\n", "an OpenDX file"), "a.lammpstrj": ("ITEM: TIMESTEP\n0\n", "a dump of LAMMPS"),
                  "a.cube": ("title\ncomment\n 1 0 0 0\n 2 1 0 0\n 2 0 1 0\n 2 0 0 1\n 1 1 0 0 0\n 1 2 3 4\n", "a cube file of Gaussian"),
+                 "a.hierarchy": ("\nGrid = 1\nGridRank          = 3\n", "of Enzo"), "a.unv": ("    -1\n   164\n  1  SI\n    -1\n", "a universal file"),
+                 "a.obj": ("# Blender\nmtllib a.mtl\no Cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\ns off\nf 1 2 3\n", "a surface without a volume"),
+                 "a.stl": ("solid of exported".ljust(80, "\0") + "\2\0\0\0" + 100 * "\1", "a surface without a volume"),
+                 "a.msh": ("(0 machine configuration:)\n(4 (60 0 0 1 2 4 4 4 8 4 8 4))\n(3010 (1 1 8 1 3)(\0\0\0\1" + 200 * "\0", "a Fluent mesh"),
                  "CHGCAR": ("Si\n 1.0\n", "of VASP"), "d3plot": ("\1" * 300, "of LS-DYNA")}
         for name, (text, words) in files.items():
             with self.subTest(name):
