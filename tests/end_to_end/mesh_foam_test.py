@@ -6,6 +6,7 @@ several processors, moving. Damaged cases get one line. Exit status 77 (skipped)
 """
 import gzip
 import json
+import os
 import shutil
 import sys
 import unittest
@@ -291,6 +292,49 @@ class MeshFoam(MeshCase):
         result = self.run_program("convert", case, "--steps", "1:", "--scalar", "yPlus", "-o", self.folder / "s.splats", "--overwrite")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("2 steps", result.stdout)
+
+    def test_fields_that_not_all_times_have(self):
+        """As usual: what only the initial time has, or some of the later ones, is left out of a series that names no scalar."""
+        case, p, _ = self.foam_case()
+        writer = FoamCase(case)
+        for time in ("1", "2"):
+            for name in ("p", "T"):
+                writer.write_field(case / time, name, p + float(time))
+        writer.write_field(case / "0", "epsilon", p)
+        for time in ("0", "0.5", "2"):
+            writer.write_field(case / time, "nut", p)
+        for steps, kept in (("all", ["T", "p"]), ("0:3:3", ["T", "nut", "p"])):
+            result = self.run_program("convert", case, "--steps", steps, "-o", self.folder / "s.splats", "--overwrite")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("left out: ", result.stderr)
+            manifest = self.manifest(self.folder / "s.splats")
+            self.assertEqual(sorted(variable["name"] for variable in manifest["variables"]), kept)
+        result = self.run_program("convert", case, "--steps", "all", "--scalar", "epsilon", "-o", self.folder / "s.splats", "--overwrite")
+        self.assertIn("has no scalar 'epsilon'", result.stderr)
+
+    def test_a_picture_reads_and_notes_the_first_time_alone(self):
+        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
+        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
+        case, p, _ = self.foam_case()
+        kept = self.folder / "kept" / "curvisplat"
+
+        def caches_after_a_picture(path):
+            result = self.run_program("render", path, "--scalar", "p", "-o", self.folder / "p.png", "--size", "20x20")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return len(list(kept.glob("*/*.splats")))
+
+        self.assertEqual(caches_after_a_picture(case), 1)
+        read = [path for path in case.rglob("*") if path.is_file() and path.parent.name != "0.5"]
+        self.assertEqual(len(list((kept / "known").iterdir())), len(read))
+        writer = FoamCase(case)
+        writer.write_field(case / "0.5", "p", p + 7)
+        self.assertEqual(caches_after_a_picture(case), 1)
+        writer.write_field(case / "0", "p", p + 7)
+        self.assertEqual(caches_after_a_picture(case), 2)
+        # The file that stands for a case is empty, and has one name in all of them.
+        self.assertEqual(caches_after_a_picture(case / "case.foam"), 3)
+        writer.write_field(case / "0", "p", p + 8)
+        self.assertEqual(caches_after_a_picture(case / "case.foam"), 4)
 
     def test_regions(self):
         """As chtMultiRegionFoam: two cubes side by side, of which one alone has U."""

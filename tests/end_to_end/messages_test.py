@@ -51,12 +51,21 @@ class Messages(FormatCase):
                  "c.nc": ("netcdf x {\ndimensions:\n\tlon = 4 ;\n}\n", "ncgen"), "a.mesh": ("MFEM mesh v1.0\n\ndimension\n3\n", "an MFEM mesh"),
                  "a.dx": ("object 1 class gridpositions counts 2 2 2\n", "an OpenDX file"), "a.lammpstrj": ("ITEM: TIMESTEP\n0\n", "a dump of LAMMPS"),
                  "a.cube": ("title\ncomment\n 1 0 0 0\n 2 1 0 0\n 2 0 1 0\n 2 0 0 1\n 1 1 0 0 0\n 1 2 3 4\n", "a cube file of Gaussian"),
+                 "a.hierarchy": ("\nGrid = 1\nGridRank          = 3\n", "of Enzo"), "a.unv": ("    -1\n   164\n  1  SI\n    -1\n", "a universal file"),
+                 "a.obj": ("# Blender\nmtllib a.mtl\no Cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\ns off\nf 1 2 3\n", "a surface without a volume"),
+                 "a.stl": ("solid of exported".ljust(80, "\0") + "\2\0\0\0" + 100 * "\1", "a surface without a volume"),
+                 "a.msh": ("(0 machine configuration:)\n(4 (60 0 0 1 2 4 4 4 8 4 8 4))\n(3010 (1 1 8 1 3)(\0\0\0\1" + 200 * "\0", "a Fluent mesh"),
                  "CHGCAR": ("Si\n 1.0\n", "of VASP"), "d3plot": ("\1" * 300, "of LS-DYNA")}
         for name, (text, words) in files.items():
             with self.subTest(name):
                 result = self.run_program("info", self.write(name, text))
                 self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
                 self.assertIn(words, result.stderr)
+        case = self.write("case/system/controlDict", "FoamFile\n{\n}\n").parent.parent
+        for path, command in ((case, "info"), (self.write("case/case.foam", ""), "info"), (case, "render"), (case, "convert")):
+            result = self.run_program(command, path, *([] if command == "info" else ["-o", self.folder / ("a.png" if command == "render" else "a.splats")]))
+            self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
+            self.assertIn("an OpenFOAM case without a mesh", result.stderr)
         for name, words in (("plt00010/Header", "a plotfile of AMReX"), ("sim.bp/md.idx", "an ADIOS2 file")):
             (self.folder / "plt00010" / "Level_0").mkdir(parents=True, exist_ok=True)
             self.assertIn(words, self.run_program("info", self.write(name, "x").parent).stderr)
@@ -65,6 +74,16 @@ class Messages(FormatCase):
         self.assertEqual(self.info(self.folder / "a.dat")["nodes"], 8)
 
     @unittest.skipUnless(importlib.util.find_spec("h5py"), "no h5py")
+    def test_a_grid_alone_is_drawn_by_what_is_computed_from_it(self):
+        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
+        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
+        grid = self.write("alone.xyz", f"1\n{NI} {NJ} {NK}\n" + "".join(numbers(POINTS[..., axis]) for axis in range(3)))
+        picture = ("-o", self.folder / "a.png", "--size", "20x20")
+        self.assertIn("choose a derived one with --scalar", self.run_program("render", grid, *picture).stderr)
+        for scalar in ("volume", "jacobian"):  # the second is added to the cache of the first
+            result = self.run_program("render", grid, "--scalar", scalar, *picture)
+            self.assertEqual((result.returncode, scalar in result.stdout), (0, True), result.stderr)
+
     def test_names_of_hdf5_files_that_are_not_read(self):
         import h5py
         for group, words in (("ENS_MAA/mesh", "a MED file"), ("settings", "a Fluent case"), ("_silolibinfo", "a Silo file"), ("sim info", "of FLASH"), ("tstt", "a MOAB mesh")):
@@ -77,7 +96,7 @@ class Messages(FormatCase):
 
     def write(self, name, text):
         path = self.folder / name
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
         return path
 

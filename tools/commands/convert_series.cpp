@@ -167,7 +167,7 @@ void follow(const ConvertArguments& arguments) {
       progress.throwIfStopped();
       if (!options.add) options.convert.title = titleOf(one.options);
       const std::vector<StepFiles> only{one};
-      const SeriesReport report = convertSeries(seriesInput(arguments, only), options, progress,
+      const SeriesReport report = convertSeries(seriesInput(arguments, only, only), options, progress,
                                                 [&](const SeriesEvent& event) { log.add(event); });
       log.sayNote();
       if (report.converted > 0) printLine("step {}: {}", report.steps - 1, one.name);
@@ -222,7 +222,7 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   for (const uint64_t place : places) own.push_back(steps[place]);
   ConvertArguments of_all = arguments;  // all parts have the same refinement
   of_all.refinement = refinementOfSteps(arguments, partCache(folder, part), steps);
-  SeriesInput input = seriesInput(of_all, own);
+  SeriesInput input = seriesInput(of_all, own, steps);
   input.places = places;
   options.convert.output = partCache(folder, part);
   options.to_part = part.index > 0;
@@ -293,7 +293,7 @@ void runConvertSeries(ConvertArguments arguments) {
   SeriesOptions options = seriesOptions(arguments);
   Ranks& ranks = launchedRanks();
   options.convert.ranks = &ranks;
-  const SeriesInput input = seriesInput(arguments, steps);
+  const SeriesInput input = seriesInput(arguments, steps, steps);
   if (arguments.dry_run) return dryRunOfSeries(input, options, arguments);
 
   requireThreads(arguments.threads);

@@ -303,11 +303,11 @@ std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std
       const bool is_one = isScalar(description, name);  // its name may have commas
       for (const std::string& part : is_one ? std::vector{name} : splitAtCommas(name))
         if (part == "all" && !isScalar(description, part))
-          stored = defaultScalars(description);
+          stored = defaultScalars(description, arguments.unusable_scalars);
         else
           words.push_back(part);
     }
-    if (names.empty()) stored = defaultScalars(description);
+    if (names.empty()) stored = defaultScalars(description, arguments.unusable_scalars);
     if (words.empty() && !stored.empty()) return stored;
     for (const std::string& note : notesOnNumbers(description, words)) printMessage("note: {}", note);
     for (const uint32_t position : scalarsNamed(description, words))
@@ -419,7 +419,43 @@ Refinement refinementOfSteps(const ConvertArguments& arguments, const std::files
   return {};
 }
 
-SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
+namespace {
+
+/// The steps that show whether all have a scalar: of one file or folder all of them, since what a solver writes besides differs from
+/// one time to the next; of other files, which are alike but for the initial one and may be many, the second and the last.
+std::vector<uint64_t> tellingSteps(const std::vector<StepFiles>& steps) {
+  std::vector<uint64_t> telling;
+  for (uint64_t step = 1; step < steps.size(); ++step)
+    if (step == 1 || step + 1 == steps.size() || steps[step].options.grid == steps.front().options.grid)
+      telling.push_back(step);
+  return telling;
+}
+
+/// The stored scalars of the first step that later ones lack. Warns of them.
+std::set<std::string> missingLater(const GridDescription& first, const std::vector<StepFiles>& steps) {
+  std::set<std::string> missing;
+  for (const uint64_t step : tellingSteps(steps)) try {
+      const auto source = openData(steps[step].options);
+      std::set<std::string> there;
+      for (const GridScalar& scalar : source->description().scalars) there.insert(scalar.name);
+      std::vector<std::string> lost;
+      for (const GridScalar& scalar : first.scalars)
+        if (!scalar.derived && !there.contains(scalar.name) && missing.insert(scalar.name).second)
+          lost.push_back(scalar.name);
+      if (!lost.empty())
+        printMessage("warning: left out: {}: the first step has {}, step {} ({}) does not", listed(lost),
+                     lost.size() == 1 ? "it" : "them", step, steps[step].name);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error&) {  // which is reported where the step is converted
+    }
+  return missing;
+}
+
+}  // namespace
+
+SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps,
+                        const std::vector<StepFiles>& all) {
   SeriesInput input;
   const auto first = std::make_shared<RefinementOnce>();
   input.count = steps.size();
@@ -432,7 +468,11 @@ SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<Ste
     return openSource(of_step, cache);
   };
   input.scalars = [&](const GridDescription& description) {
-    return chooseScalars(arguments, arguments.scalars, description);
+    ConvertArguments of_all = arguments;
+    const bool names_them = !arguments.scalars.empty() && !std::ranges::count(arguments.scalars, "all");
+    // --keep-going leaves out steps instead.
+    if (!names_them && !arguments.keep_going) of_all.unusable_scalars = missingLater(description, all);
+    return chooseScalars(of_all, arguments.scalars, description);
   };
   return input;
 }

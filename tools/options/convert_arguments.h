@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -56,6 +57,7 @@ struct ConvertArguments {
   OpenGridOptions grid;
   GasModel gas;
   std::vector<std::string> scalars, added_scalars;
+  std::set<std::string> unusable_scalars;  // are not converted unless they are named
   std::filesystem::path output, to, temporary_folder, statistics, trace;
   std::optional<double> blank_value;
   std::optional<std::string> refine;     // parts of a cell along each axis, or auto (the default)
@@ -156,8 +158,9 @@ std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments, const std:
 Refinement refinementOfSteps(const ConvertArguments& arguments, const std::filesystem::path& cache,
                              const std::vector<StepFiles>& steps);
 
-/// A series for convertSeries(): opens each step as `arguments` say, and chooses the scalars from the first.
-/// `arguments` and `steps` must outlive the result.
-SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps);
+/// A series for convertSeries(): opens each step as `arguments` say, and chooses the scalars from the first: where none are named, those
+/// that all of the series' steps have (`all`; `steps` may be a part of them). The arguments must outlive the result.
+SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps,
+                        const std::vector<StepFiles>& all);
 
 }  // namespace curvisplat

@@ -70,10 +70,12 @@ Centring defaultCentring(const GridDescription& description, const std::vector<u
 
 }  // namespace
 
-std::vector<uint32_t> defaultScalars(const GridDescription& description) {
+std::vector<uint32_t> defaultScalars(const GridDescription& description,
+                                     const std::set<std::string>& unusable) {
   std::vector<uint32_t> stored, positions;
   for (uint32_t n = 0; n < description.scalars.size(); ++n)
-    if (!description.scalars[n].derived) stored.push_back(n);
+    if (!description.scalars[n].derived && !unusable.contains(description.scalars[n].name))
+      stored.push_back(n);
   if (stored.empty()) return {};
   const Centring centring = defaultCentring(description, stored);
   LeftOut left_out;

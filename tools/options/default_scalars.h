@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -11,6 +13,8 @@ namespace curvisplat {
 /// The scalars that the files store and that can share a cache, each name once and 16 at most: positions in description.scalars, in their
 /// order. They have the centring of the first one, unless quantities that flow solvers compute are there in the other alone. Beyond 16,
 /// components are left out before scalars, those of tensors first. Prints notes that name what is left out, and how to choose it.
-std::vector<uint32_t> defaultScalars(const GridDescription& description);
+/// Those of `unusable` are not chosen.
+std::vector<uint32_t> defaultScalars(const GridDescription& description,
+                                     const std::set<std::string>& unusable = {});
 
 }  // namespace curvisplat

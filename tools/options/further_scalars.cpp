@@ -99,7 +99,7 @@ void addScalarToSeries(const fs::path& cache, const std::vector<fs::path>& files
   const PreviewFolder folder(whole.parent_path(), folder_name);  // in the end, of the old one
   arguments.output = folder.path() / whole.filename();
   const SeriesOptions options = optionsLike(before, arguments.output);
-  convertSeries(seriesInput(arguments, steps), options, progress, [&](const SeriesEvent& event) {
+  convertSeries(seriesInput(arguments, steps, steps), options, progress, [&](const SeriesEvent& event) {
     if (event.converted && !isSameStep(CacheReader(arguments.output).manifest(), before.manifest()))
       refuse(before, name);
   });

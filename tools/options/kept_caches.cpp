@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <set>
@@ -22,6 +23,8 @@
 #include "preprocess/formats/common/unpacked_file.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_files.h"
+#include "preprocess/formats/openfoam/foam_case.h"
+#include "preprocess/formats/openfoam/foam_source.h"
 #include "stream/base/checksum.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
@@ -78,7 +81,9 @@ std::optional<uint64_t> notedChecksum(const fs::path& memo, const std::string& s
     std::istringstream text(readTextFile(memo, kMaxMemo));
     std::string before;
     uint64_t checksum = 0;
-    if (std::getline(text, before) && before == stamp && text >> checksum) return checksum;
+    // A note that a power loss has cut short has no line's end.
+    if (std::getline(text, before) && before == stamp && text >> checksum && text.get() == '\n')
+      return checksum;
   } catch (const Error&) {
     // The file's own bytes are as good.
   }
@@ -86,13 +91,14 @@ std::optional<uint64_t> notedChecksum(const fs::path& memo, const std::string& s
 }
 
 /// Notes a file's checksum. Several processes may open one file for the first time, so it is written under
-/// another name first. A note that cannot be written is missed by the next process only.
+/// another name first. A note that cannot be written, or that a power loss takes, is missed by the next process only; so none is synced,
+/// which would take longer than all else where there are thousands.
 void noteChecksum(const fs::path& memo, const std::string& stamp, uint64_t checksum) {
-  try {
-    writeFileDurably(memo, fmt::format("{}\n{}\n", stamp, checksum));
-  } catch (const Error&) {
-    return;
-  }
+  const fs::path written = memo.string() + fmt::format(".{}", ::getpid());
+  std::ofstream(written) << fmt::format("{}\n{}\n", stamp, checksum);
+  std::error_code error;
+  fs::rename(written, memo, error);
+  if (error) fs::remove(written, error);
 }
 
 /// The checksum of a file's bytes, from `known` if it has not changed since. `stamp`: of the file, before.
@@ -213,14 +219,17 @@ class StampedFiles {
 
   const std::vector<fs::path>& all() const { return all_; }
   const std::vector<std::string>& stamps() const { return stamps_; }  // [file]
+  /// Folders of times that are not read, within their case.
+  const std::vector<std::string>& timesLeftOut() const { return times_left_out_; }
 
  private:
-  /// Adds `file`: of a folder all files; and those that a small text names. At each depth a file is looked at once: a text
+  /// Adds `file`: of a folder all files (of a case of OpenFOAM those that are read); and those that a small text names. At each depth a file is looked at once: a text
   /// may name another one, which does the same, thousands of times.
   void add(const fs::path& file, int depth) {
     progress_.throwIfStopped();
     std::error_code error;
-    if (fs::is_directory(file, error)) return addFolder(file);
+    if (isFoamCase(file)) return addCase(foamCaseOf(file).folder);
+    if (fs::is_directory(file, error)) return addFolder(file, {});
     if (!seen_.emplace(depth, file.lexically_normal()).second) return;
     all_.push_back(file);
     constexpr int kMaxDepth = 3;  // a .pvd of .vtm of .vts
@@ -234,11 +243,33 @@ class StampedFiles {
     }
   }
 
-  void addFolder(const fs::path& folder) {
+  /// Adds the files of a case of OpenFOAM, which a file or a region's folder may stand for, but not those of times behind the first one,
+  /// which are not read: there may be thousands. The names of these times count, since they decide whether the case's own times or those
+  /// of its processors are read.
+  void addCase(const fs::path& folder) {
+    std::vector<fs::path> roots{folder};
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder, error))
+      if (entry.path().filename().string().starts_with("processor") && entry.is_directory(error))
+        roots.push_back(entry.path());
+    std::set<std::string> first_ones;
+    std::set<fs::path> later;
+    for (const fs::path& root : roots) {
+      const auto times = foamTimesIn(root);
+      if (!times.empty()) first_ones.insert(times.front().second);
+      for (const auto& time : times) later.insert(root / time.second);
+    }
+    std::erase_if(later, [&](const fs::path& time) { return first_ones.contains(time.filename().string()); });
+    for (const fs::path& time : later) times_left_out_.push_back(time.lexically_relative(folder).string());
+    addFolder(folder, later);
+  }
+
+  void addFolder(const fs::path& folder, const std::set<fs::path>& left_out) {
     std::error_code error;
     const auto begin = static_cast<std::ptrdiff_t>(all_.size());
     for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
       progress_.throwIfStopped();
+      if (left_out.contains(at->path())) at.disable_recursion_pending();
       if (std::error_code no_file; at->is_regular_file(no_file)) all_.push_back(at->path());
     }
     std::sort(all_.begin() + begin, all_.end());
@@ -247,7 +278,7 @@ class StampedFiles {
   const Progress& progress_;
   std::set<std::pair<int, fs::path>> seen_;
   std::vector<fs::path> all_;
-  std::vector<std::string> stamps_;
+  std::vector<std::string> stamps_, times_left_out_;
 };
 
 /// A checksum of what makes two grids the same: the program, the bytes of the files, and their names, since
@@ -258,6 +289,7 @@ uint64_t contentsOf(const std::vector<fs::path>& files, const StampedFiles& stam
   std::string contents = CURVISPLAT_VERSION;
   for (size_t n = 0; n < stamped.all().size(); ++n)
     contents += fmt::format(" {:016x}", checksumOf(stamped.all()[n], stamped.stamps()[n], known, progress));
+  for (const std::string& time : stamped.timesLeftOut()) contents += ' ' + time;
   contents += ' ';
   contents += namesOf(files);
   return checksumOfText(contents);
@@ -343,7 +375,7 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
     const MakingLock lock(place / "used", progress);
     removeChanged(place, cache);
     if (!fs::exists(cache / "manifest.json", error)) {
-      makeKeptCache(files, cache, progress, events, precision);
+      makeKeptCache(files, cache, progress, events, scalars, precision);
       if (const StampedFiles now(files, progress);
           now.all() != stamped.all() || now.stamps() != stamped.stamps()) {
         writeFileDurably(place / kChanged, "");

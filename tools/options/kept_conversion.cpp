@@ -170,10 +170,28 @@ void makePreviewOfFirstStep(const SeriesInput& input, const ConvertOptions& whol
   }
 }
 
+/// The default scalars; of a grid alone those of `wanted` that it has.
+std::vector<uint32_t> scalarsOf(const ConvertArguments& arguments, const std::vector<std::string>& wanted,
+                                const GridDescription& description) {
+  const bool is_alone = std::ranges::all_of(description.scalars, &GridScalar::derived);
+  std::vector<std::string> names;
+  for (const std::string& name : wanted)
+    if (is_alone && std::ranges::count(description.scalars, name, &GridScalar::name) == 1 &&
+        std::ranges::count(names, name) == 0)
+      names.push_back(name);
+  try {
+    return chooseScalars(arguments, names, description);
+  } catch (const Error& error) {
+    if (is_alone) throw LoneGrid("{}", error.what());
+    throw;
+  }
+}
+
 /// Makes a series beside its place, since a cache of its first steps looks complete. It is not moved when it
 /// is complete, since a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
-                const KeptCacheEvents& events, ValuePrecision precision) {
+                const KeptCacheEvents& events, const std::vector<std::string>& scalars,
+                ValuePrecision precision) {
   const auto folder = std::make_shared<PreviewFolder>(output.parent_path(), kSeries);
   arguments.output = folder->path() / output.filename();
   const std::vector<StepFiles> steps = stepsOf(arguments.grid);
@@ -181,7 +199,12 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
   options.convert.precision = precision;
-  const SeriesInput input = seriesInput(arguments, steps);
+  SeriesInput input = seriesInput(arguments, steps, steps);
+  const auto of_files = input.scalars;
+  input.scalars = [&](const GridDescription& description) {
+    const bool is_alone = std::ranges::all_of(description.scalars, &GridScalar::derived);
+    return is_alone ? scalarsOf(arguments, scalars, description) : of_files(description);
+  };
   makePreviewOfFirstStep(input, optionsFor(output, title), progress, events);
   convertSeries(input, options, progress, [&](const SeriesEvent& event) {
     if (!event.converted) return;
@@ -201,30 +224,23 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   folder->keep();
 }
 
-std::vector<uint32_t> scalarsOf(const ConvertArguments& arguments, const GridDescription& description) {
-  try {
-    return chooseScalars(arguments, {}, description);
-  } catch (const Error& error) {
-    if (std::ranges::all_of(description.scalars, &GridScalar::derived)) throw LoneGrid("{}", error.what());
-    throw;
-  }
-}
-
 }  // namespace
 
 void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, Progress& progress,
-                   const KeptCacheEvents& events, ValuePrecision precision) {
+                   const KeptCacheEvents& events, const std::vector<std::string>& scalars,
+                   ValuePrecision precision) {
   for (const char* const name : {kPreview, kSeries})
     PreviewFolder::removeLeftOnes(output.parent_path(), name);
   ConvertArguments arguments;
   arguments.grid.grid = files.front();
   arguments.grid.solutions.assign(files.begin() + 1, files.end());
   arguments.output = output;
-  if (hasSeveralStepFiles(arguments.grid)) return makeSeries(arguments, output, progress, events, precision);
+  if (hasSeveralStepFiles(arguments.grid))
+    return makeSeries(arguments, output, progress, events, scalars, precision);
   const auto source = openSource(arguments, output);
   ConvertOptions options = optionsFor(output, files.front().stem().string());
   options.precision = precision;
-  options.scalars = scalarsOf(arguments, source->description());
+  options.scalars = scalarsOf(arguments, scalars, source->description());
   makePreview(*source, options, false, progress, events);
   sayAll(events, source->description(), convert(*source, options, progress));
 }

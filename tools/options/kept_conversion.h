@@ -71,10 +71,11 @@ inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
 /// Converts the grid or the series of time steps in `files` to `output`, which is complete or does not
 /// exist. Previews and scratch files are in the same folder; a preview stays while it is held. A series
 /// stays in the folder of its preview, and `output` links to it. Previews of a series show its first step: a
-/// coarse one if the step is large, then the step as converted. Throws Error as opening and converting do, LoneGrid,
+/// coarse one if the step is large, then the step as converted. If the files hold a grid alone, those of `scalars` that can be computed
+/// from it are converted; other names are passed over. Throws Error as opening and converting do, LoneGrid if none can,
 /// Interrupted once `progress` is stopped.
 void makeKeptCache(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output,
-                   Progress& progress, const KeptCacheEvents& events,
-                   ValuePrecision precision = ValuePrecision::kAuto);
+                   Progress& progress, const KeptCacheEvents& events, const std::vector<std::string>& scalars,
+                   ValuePrecision precision);
 
 }  // namespace curvisplat

@@ -330,7 +330,7 @@ py::dict convertSteps(const ConvertArguments& arguments, const std::vector<StepF
   options.convert = std::move(of_each);
   options.add = arguments.adds_steps;
   options.keep_going = arguments.keep_going;
-  const SeriesInput input = seriesInput(arguments, steps);
+  const SeriesInput input = seriesInput(arguments, steps, steps);
   SeriesReport series;
   ConvertReport first;
   std::vector<std::string> warnings, notes;

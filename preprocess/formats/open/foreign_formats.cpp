@@ -187,6 +187,43 @@ bool isFluent(std::string_view begin) {
          (begin[2] == ' ' || (begin[2] >= '0' && begin[2] <= '9'));
 }
 
+constexpr const char* kFluent = "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)";
+constexpr const char* kSurface = "a surface without a volume (render --surface FILE draws it)";
+
+/// A head of 80 bytes of any kind, the count of triangles, and 50 bytes for each to the end of the file.
+bool isBinaryStl(std::string_view begin, uint64_t file_bytes) {
+  constexpr uint64_t kHead = 84, kTriangle = 50;
+  if (begin.size() < kHead + kTriangle) return false;
+  const uint64_t triangles = loadStored<uint32_t>(std::as_bytes(std::span(begin)).data() + 80, false);
+  return file_bytes == kHead + kTriangle * triangles;
+}
+
+/// Each line begins with a word of Wavefront's, and some line has a point. `begin`: in lower case.
+bool isWavefrontObj(std::string_view begin) {
+  begin = begin.substr(0, begin.rfind('\n') + 1);  // whole lines
+  bool has_points = false;
+  for (std::string_view line = nextLine(begin, '#'); !line.empty(); line = nextLine(begin, '#')) {
+    constexpr std::array<std::string_view, 11> kWords{"v", "vt", "vn", "vp",     "f",     "l",
+                                                      "p", "o",  "g",  "mtllib", "usemtl"};
+    const std::vector<std::string_view> words = wordsOf(line);
+    if (words.front() != "s" && std::ranges::find(kWords, words.front()) == kWords.end()) return false;
+    has_points |= words.front() == "v" && words.size() >= 4;
+  }
+  return has_points;
+}
+
+/// A line with -1 alone, then one with the number of a data set.
+bool isUniversalFile(std::string_view begin) {
+  if (nextLine(begin, '\0') != "-1") return false;
+  const auto number = countIn(nextLine(begin, '\0'));
+  constexpr uint64_t kLargestNumber = 99'999;
+  return number && *number > 0 && *number <= kLargestNumber;
+}
+
+bool isEnzoHierarchy(std::string_view begin) {
+  return nextLine(begin, '#').starts_with("grid = ") && nextLine(begin, '#').starts_with("gridrank");
+}
+
 /// Two lines of description, then how nodes and elements are numbered. What follows tells EnSight 6 from Gold.
 std::optional<std::string> ensightGeometry(std::string_view begin) {
   std::array<std::string_view, 6> lines;
@@ -232,9 +269,9 @@ constexpr Magic kFirstWords[] = {
     {"<?xml"sv, "an XML file"},
     {"*heading"sv, "an Abaqus mesh, which is not read (meshio convert FILE mesh.vtu)"},
     {"meshversionformatted"sv, "a Medit mesh, which is not read (meshio convert FILE mesh.vtu)"},
-    {"solid "sv, "a surface without a volume (render --surface FILE draws it)"},
-    {"ply\n"sv, "a surface without a volume (render --surface FILE draws it)"},
-    {"ply\r"sv, "a surface without a volume (render --surface FILE draws it)"},
+    {"solid "sv, kSurface},
+    {"ply\n"sv, kSurface},
+    {"ply\r"sv, kSurface},
     {"mesh2d"sv, "a mesh of SMS (.2dm), which has no volume"},
     {"mesh3d"sv, "a mesh of SMS (.3dm), which is not read"},
     {"control info"sv, "a neutral file of GAMBIT, which is not read (save it as CGNS or EnSight Gold)"},
@@ -281,11 +318,15 @@ std::optional<std::string> foreignText(std::string begin) {
       std::string_view(begin).substr(std::min(begin.find_first_not_of(' '), begin.size()));
   for (const Magic& first : kFirstWords)
     if (words.starts_with(first.bytes)) return first.words;
-  if (isFluent(begin)) return "a Fluent mesh or case, which is not read (save it as CGNS or EnSight Gold)";
   if (auto geometry = ensightGeometry(begin)) return geometry;
   if (isEclipseText(begin)) return "an ECLIPSE grid (GRDECL), which is not read";
   if (begin.starts_with("foamfile") || begin.find("\nfoamfile\n") != std::string::npos)
     return "a file of an OpenFOAM case (give the case's folder instead)";
+  if (isEnzoHierarchy(begin))
+    return "a hierarchy of Enzo, which is not read (save it as VTK's .vthb, with ParaView)";
+  if (isUniversalFile(begin))
+    return "a universal file (.unv), which is not read (gmsh FILE -save -o mesh.msh)";
+  if (isWavefrontObj(begin)) return kSurface;
   if (isNastran(begin)) return "a Nastran mesh, which is not read (meshio convert FILE mesh.vtu)";
   if (isAvsUcd(begin)) return kAvsUcd;
   if (isGaussianCube(begin)) return "a cube file of Gaussian, which is not read (save it as VTK's .vti)";
@@ -343,6 +384,8 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
     return "a NIfTI image, which is not read (save it as VTK's .vti, with ParaView)";
   if (isSelafin(begin)) return "a SELAFIN file of Telemac, which is not read (save it as VTK)";
   if (isAvsUcdBinary(begin)) return kAvsUcd;
+  if (isBinaryStl(begin, file.size())) return kSurface;
+  if (isFluent(begin)) return kFluent;  // of its binary files the first sections are text, too
   // The first four bytes of an ADF file differ between versions.
   if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
   return foreignText(std::move(begin));
@@ -358,6 +401,10 @@ std::optional<std::string> foreignFolder(const std::filesystem::path& folder) {
   for (const char* mark : {"md.idx", "data.0"})
     if (std::filesystem::is_regular_file(folder / mark, error))
       return "an ADIOS2 file (.bp), which is not read (save it as VTK, with ParaView)";
+  if (std::filesystem::is_regular_file(folder / "system" / "controlDict", error) && !isFoamCase(folder))
+    return "an OpenFOAM case without a mesh: there is no constant/polyMesh (blockMesh, or what else the "
+           "case's "
+           "Allrun calls, makes it)";
   const std::filesystem::path around = folderOf(folder.has_filename() ? folder : folder.parent_path());
   const bool is_cache = std::filesystem::exists(folder / "manifest.json", error) ||
                         folder.string().find(".splats") != std::string::npos;

@@ -194,6 +194,9 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
         throw Error("{}: describes its own files; leave out {}", options.grid.string(),
                     options.solutions.front().string());
       }
+    // The empty file that stands for a case of OpenFOAM, which has no mesh.
+    if (options.grid.extension() == ".foam" || options.grid.extension() == ".OpenFOAM")
+      refuseForeign(folderOf(options.grid), "a grid file");
     if (file.size() == 0) throw Error("{}: is empty; expected a grid file", options.grid.string());
   }
   refuseForeign(options.grid, "a grid file");
