@@ -78,6 +78,7 @@ GridSurvey MeshOrigin::survey(Progress& progress) {
   MeshSurvey survey = surveyMesh(reader_, progress);
   used_ = std::move(survey.used);
   drawn_cells_ = survey.drawn_cells;
+  unused_points_ = survey.unused_points;
   chunk_bytes_ = survey.chunk_bytes;
   open_polyhedra_ = warningOfOpenPolyhedra(survey);
   numbers_.emplace(reader_, plan_.mesh_bytes / 2, scratch_, progress);
@@ -85,11 +86,10 @@ GridSurvey MeshOrigin::survey(Progress& progress) {
 }
 
 std::vector<std::string> MeshOrigin::warnings() {
-  const auto unused = static_cast<uint64_t>(std::count(used_.begin(), used_.end(), false));
   std::vector<std::string> warnings;
-  if (unused > 0)
-    warnings.push_back(
-        fmt::format("{} of {} points belong to no solid cell and are left out", unused, reader_.points()));
+  if (unused_points_ > 0)
+    warnings.push_back(fmt::format("{} of {} points belong to no solid cell and are left out", unused_points_,
+                                   reader_.points()));
   if (!open_polyhedra_.empty()) warnings.push_back(open_polyhedra_);
   return warnings;
 }
@@ -186,6 +186,7 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
   grid.ranges.resize(reader.scalars());
   grid.nodes = cell_data ? reader.cells() : reader.points();
   survey.used.resize(reader.points());
+  std::vector<bool> of_blanked;  // [point]: a solid cell without a value has it; empty if there is none
 
   std::vector<uint64_t> first_points{0};
   for (const MeshPiece& piece : reader.pieces()) first_points.push_back(first_points.back() + piece.points);
@@ -194,6 +195,11 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
     survey.chunk_bytes = std::max(survey.chunk_bytes, bytesOf(cells));
     for (size_t n = 0; n < cells.size(); ++n) {
       ++survey.cells_of[static_cast<size_t>(cells.shapes[n])];
+      if (cells.shapes[n] == CellKind::kNone && cells.hidden[n] == kHasNoValue) {
+        of_blanked.resize(reader.points());
+        for (const uint64_t corner : cells.cornersOfCell(n))
+          of_blanked[first_points[loaded.range.piece] + corner] = true;
+      }
       if (cells.shapes[n] == CellKind::kNone) continue;
       ++survey.drawn_cells;
       if (cells.shapes[n] == CellKind::kPolyhedron && !isClosed(cells.facesOfCell(n)) &&
@@ -218,7 +224,7 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
     const MeshPoints& points = loaded.points;
     for (size_t n = 0; n < points.x.size(); ++n) {
       if (!survey.used[loaded.range.number + n]) {
-        ++survey.unused_points;
+        if (of_blanked.empty() || !of_blanked[loaded.range.number + n]) ++survey.unused_points;
         continue;
       }
       if (std::isnan(points.x[n])) continue;

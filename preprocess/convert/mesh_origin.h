@@ -68,15 +68,15 @@ class MeshOrigin final : public SplatOrigin {
   SlabCells slabs_ = SlabCells::kHalved;
   std::optional<PointNumbers> numbers_;
   std::vector<bool> used_;  // [point]: a cell that is drawn has it
-  uint64_t drawn_cells_ = 0, chunk_bytes_ = 0;
+  uint64_t drawn_cells_ = 0, unused_points_ = 0, chunk_bytes_ = 0;
   std::string open_polyhedra_;  // warningOfOpenPolyhedra()
 };
 
 /// The contents of an unstructured grid.
 struct MeshSurvey {
-  GridSurvey grid;                     // samples: points or cells, as the reader's scalars are
-  std::array<uint64_t, 6> cells_of{};  // [CellKind]; kNone: hidden ones and those that are not solid
-  uint64_t drawn_cells = 0, unused_points = 0;
+  GridSurvey grid;                              // samples: points or cells, as the reader's scalars are
+  std::array<uint64_t, 6> cells_of{};           // [CellKind]; kNone: hidden ones and those that are not solid
+  uint64_t drawn_cells = 0, unused_points = 0;  // unused: no solid cell has them, with a value or without
   uint64_t open_polyhedra = 0, first_open = 0;  // those that are not isClosed(), and the number of the first
   uint64_t chunk_bytes = 0;                     // of the largest chunk of cells that was read
   std::vector<bool> used;                       // [point]: a cell that is drawn has it

@@ -95,6 +95,7 @@ void MeshReader::load(const MeshRange& range, LoadedCells& out) const {
     if (!by_grid && cells.scalars.size() > 1)
       out.blanked.addLost(cells.scalars, n, range.number + n, blank_value_);
     cells.shapes[n] = CellKind::kNone;
+    if (!by_grid) cells.hidden[n] = kHasNoValue;
     ++(by_grid ? out.blanked.by_grid : by_value ? out.blanked.by_value : out.blanked.not_finite);
   }
 }

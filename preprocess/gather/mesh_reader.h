@@ -28,6 +28,8 @@ struct LoadedPoints {
   MeshPoints points;
   BlankCounts blanked;
 };
+/// MeshCells::hidden of a solid cell that a reader has blanked by its value.
+inline constexpr uint8_t kHasNoValue = 2;
 struct LoadedCells {
   MeshRange range;
   MeshCells cells;

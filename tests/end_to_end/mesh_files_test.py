@@ -294,6 +294,28 @@ class MeshFiles(MeshCase):
         self.assertIn("has a wrong checksum", refused.stderr)
         self.assertEqual(refused.returncode, 1)
 
+    def test_points_of_cells_without_values_are_not_said_to_have_no_cell(self):
+        """Of sets of scalars that have values in other cells."""
+        grid = cube(2, kinds=("hexahedron",))
+        n = np.arange(grid.GetNumberOfCells()).astype(float)
+        for name, values in (("low", np.where(n < len(n) / 2, n, np.nan)), ("high", np.where(n < len(n) / 2, np.nan, n))):
+            array = numpy_to_vtk(values, deep=True)
+            array.SetName(name)
+            grid.GetCellData().AddArray(array)
+        write_xml(grid, self.folder / "mesh.vtu")
+        convert = ("convert", self.folder / "mesh.vtu", "-o", self.folder / "a.splats", "--scalar", "low,high", "--overwrite")
+        result = self.run_program(*convert)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("high has values at other samples than low", result.stdout + result.stderr)
+        self.assertNotIn("belong to no solid cell", result.stderr)
+        grid.GetPoints().InsertNextPoint(0, 0, 0)
+        for index in range(grid.GetPointData().GetNumberOfArrays()):
+            array = grid.GetPointData().GetArray(index)
+            array.InsertNextTuple([0] * array.GetNumberOfComponents())
+        write_xml(grid, self.folder / "mesh.vtu")
+        points = grid.GetNumberOfPoints()
+        self.assertIn(f"1 of {points} points belong to no solid cell", self.run_program(*convert).stderr)
+
     def test_ranges_are_of_what_is_drawn(self):
         """Faces that mesh generators write beside the cells have values, too."""
         grid = cube(2)

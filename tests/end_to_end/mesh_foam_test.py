@@ -284,8 +284,8 @@ class MeshFoam(MeshCase):
             writer.write_field(case / time, "UMean", u)
         writer.write_field(case / "2", "k", p)
         writer.write(case / "0" / "p", "volScalarField", "dimensions [0 2 -2 0 0 0 0];\ninternalField #calc \"1\";\n")
-        expected = ["UMean, p, yPlus are read from time 0.5 on, not at time 0: --time-step 1, or --steps 1:2 for a series",
-                    "k is read from time 2 on, not at time 0: --time-step 2, or --steps 2:2 for a series"]
+        expected = ["UMean, p, yPlus are read from time 0.5 on, not at time 0: convert with --time-step 1, or with --steps 1:2 for a series",
+                    "k is read from time 2 on, not at time 0: convert with --time-step 2, or with --steps 2:2 for a series"]
         self.assertEqual(self.info(case)["warnings"][1:], expected)
         result = self.run_program("convert", case, "--steps", "all", "--scalar", "T", "-o", self.folder / "s.splats")
         self.assertIn(expected[0], result.stderr)

@@ -322,10 +322,11 @@ void FoamSource::warnOfLaterFields() {
       }
     }
   for (const auto& [step, names] : later)
-    description_.warnings.push_back(fmt::format(
-        "{} {} read from time {} on, not at time {}: --time-step {}, or --steps {}:{} for a series",
-        listed(names), names.size() == 1 ? "is" : "are", time_names_[step],
-        time_names_[description_.time_step], step, step, time_names_.size() - 1));
+    description_.warnings.push_back(
+        fmt::format("{} {} read from time {} on, not at time {}: convert with --time-step {}, or with "
+                    "--steps {}:{} for a series",
+                    listed(names), names.size() == 1 ? "is" : "are", time_names_[step],
+                    time_names_[description_.time_step], step, step, time_names_.size() - 1));
 }
 
 void FoamSource::addField(const std::string& name, size_t components) {
