@@ -77,7 +77,7 @@ TEST_F(WindowKeyboard, TabReachesEveryTabOfThePanels) {
     ASSERT_TRUE(eventually([&, first = widgets.front()] { return hasWidget(first); })) << shown;
     const std::vector<std::string> names = round();
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
-    for (const std::string& wanted :
+    for (const char* const wanted :
          {"tab Colour", "tab Objects", "tab View", "Save picture", "menu File", "menu Help"})
       EXPECT_NE(std::ranges::find(names, wanted), names.end()) << shown << ' ' << wanted;
     size_t place = 0;
