@@ -246,6 +246,8 @@ def count(arguments, out):
         results.run([arguments.program, "render", cache, "-o", arguments.folder / "counted.pfm", "--stats", told, "--backend", "egl",
                      "--card-memory", "1G", "--size", picture, "--memory", "2G", *options], env=os.environ | {"CURVISPLAT_COUNT_PIXELS": "1"})
         frame = json.loads(told.read_text())["frames"][0]
+        if not frame["card_pixels_listed"]:
+            sys.exit(f"{name}: no compute shaders drew it; see {arguments.program} info --system")
         moved = gigabytes_of(frame, width * height)
         looks, blends = frame["card_pixels_listed"], frame["card_pixels_blended"]
         bytes_ms = 1e3 * sum(moved.values()) * 1e9 / BYTES_PER_S

@@ -87,7 +87,7 @@ class CpuBackend final : public PaintingBackend {
 
 /// Compute shaders in a context of the window's. Throws Error if there are none, or if they would run elsewhere than EGL's.
 std::unique_ptr<GlBackend> makeSharingBackend(GlSharing& window) {
-  const std::string renderer = GlThread(GlLibrary::kEgl).renderer();
+  static const std::string renderer = GlThread(GlLibrary::kEgl).renderer();  // of the first that was made
   if (renderer != window.renderer())
     throw Error("the window is drawn by {}, and pictures by {}", window.renderer(), renderer);
   return std::make_unique<GlBackend>([&window] { return window.makeContext(); }, GlBackend::Way::kTiles);

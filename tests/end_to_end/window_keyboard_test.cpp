@@ -101,13 +101,15 @@ TEST_F(WindowKeyboard, SpaceAndReturnPressWhatHasTheRing) {
   goTo("clear");
   // The ring is seen: the widget's edge has its gold.
   const auto [x, y] = placeOf("clear", 0.5, 0);
-  const Image screen = display_->screenshot();
-  bool is_gold = false;
-  for (int row = y - 1; row <= y + 3; ++row) {
-    const float* const pixel = screen.pixel(x, row);
-    is_gold |= pixel[0] > 0.8f && pixel[1] > 0.6f && pixel[2] < 0.5f;
-  }
-  EXPECT_TRUE(is_gold);
+  const auto is_gold = [&, column = x, top = y] {
+    const Image screen = display_->screenshot();
+    for (int row = top - 1; row <= top + 3; ++row) {
+      const float* const pixel = screen.pixel(column, row);
+      if (pixel[0] > 0.8f && pixel[1] > 0.6f && pixel[2] < 0.5f) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(eventually(is_gold));
   press("space");
   const Image clear = save();
   EXPECT_LT(difference(first, clear), 40);

@@ -462,12 +462,12 @@ TEST_F(FailingCard, OfOneRankLeavesThePictureToTheOthersAndToQuads) {
     for (const unsigned failing : {0u, 2u}) {
       Image first, second;
       std::string name;
-      runRanks(3, [&](Ranks& ranks) {
+      runRanks(3, [&, of_rank = faults](Ranks& ranks) {
         const bool fails = ranks.rank() == failing;
         auto backend = fails ? std::make_unique<FailingBackend>() : makeBackend(Backend::kCpu);
         FrameRenderer renderer(*cache_, DrawnScalars(0, TransferFunction::preset("viridis", -1, 1, 0.02)),
                                std::move(backend));
-        if (fails) FailingBackend::faults = faults;
+        if (fails) FailingBackend::faults = of_rank;
         FrameOptions with = options(0);
         with.ranks = &ranks;
         FrameStatistics statistics;

@@ -116,6 +116,25 @@ TEST(History, GoesBackAndForth) {
   EXPECT_EQ(history.undo()->state.lod_pixels, 1);
 }
 
+/// Memory that was raised for a picture is no step of its own, and an undo does not take it back.
+TEST(History, KeepsMemoryThatWasRaised) {
+  Manifest manifest;
+  manifest.upper = {1, 1, 1};
+  manifest.variables = {{0, "density", "", 0, 1}};
+  ViewState state = firstViewOf(manifest, {300, 200});
+  History history(state, {});
+  state.lit = true;
+  history.record(state, {});
+  const uint64_t raised = state.memory_bytes + (1 << 20);
+  state.memory_bytes = raised;
+  history.raiseMemory(raised);
+  history.record(state, {});
+  const ViewState before = history.undo()->state;
+  EXPECT_FALSE(before.lit);
+  EXPECT_EQ(before.memory_bytes, raised);
+  EXPECT_FALSE(history.canUndo());
+}
+
 TEST(Commands, EachKeyHasOne) {
   for (const CommandInfo& info : commands()) {
     if (info.key == 0) continue;

@@ -395,7 +395,7 @@ void FunctionPanel::drawUnit(EditedFunction& function, Result& result) {
     function.setOpacityUnit(roundedTo(usual / density, usual / density, kDigits));
     result.changed = true;
   }
-  result.dragging |= ImGui::IsItemActive();
+  result.dragging |= isDragged();
   nameWidget("strength");
   hint("how opaque all is: a hundredth of the data's size, over the opacity unit");
 }

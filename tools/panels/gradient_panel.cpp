@@ -90,7 +90,7 @@ GradientPanel::Result GradientPanel::draw(std::vector<OpacityPoint>& points, siz
     points = rampBetween(share(from), share(std::max(from, to)));
     result.changed = true;
   }
-  result.dragging = ImGui::IsItemActive();
+  result.dragging = isDragged();
   nameWidget("gradient shares");
   hint(
       "What is less steep than the first part of the volume is hidden, what is steeper than the second is "

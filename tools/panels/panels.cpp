@@ -128,7 +128,8 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
 void Panels::drawTime(PanelActions& actions, Playback& playback) {
   label("steps per second");
   float speed = static_cast<float>(playback.stepsPerSecond());
-  if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f")) playback.setStepsPerSecond(speed);
+  if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f", ImGuiSliderFlags_AlwaysClamp))
+    playback.setStepsPerSecond(speed);
   nameWidget("steps per second");
   bool loops = playback.loops();
   if (option("loop", loops)) playback.setLoop(loops);
@@ -259,7 +260,7 @@ void drawLight(ViewState& state, PanelActions& actions) {
     label(name);
     const bool slides = ImGui::SliderScalar(fmt::format("##{}", name).c_str(), ImGuiDataType_Double, &value,
                                             &low, &high, format, ImGuiSliderFlags_AlwaysClamp);
-    actions.dragging |= ImGui::IsItemActive();
+    actions.dragging |= isDragged();
     actions.changed |= slides;
     nameWidget(name);
     return slides;
@@ -365,7 +366,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   float angle = static_cast<float>(state.camera.view_angle_deg);
   label("view angle");
   ImGui::BeginDisabled(!perspective);
-  if (ImGui::SliderFloat("##view angle", &angle, 10, 120, "%.0f°")) {
+  if (ImGui::SliderFloat("##view angle", &angle, 10, 120, "%.0f°", ImGuiSliderFlags_AlwaysClamp)) {
     state.camera.view_angle_deg = static_cast<double>(angle);
     actions.changed = true;
   }
@@ -421,16 +422,18 @@ void Panels::drawColour(ViewState& state, const PanelFacts& facts, PanelActions&
 void Panels::drawDetail(ViewState& state, PanelActions& actions) {
   float lod = static_cast<float>(state.lod_pixels);
   label("error, pixels");
-  if (ImGui::SliderFloat("##error", &lod, 0, 16, "%.2f", ImGuiSliderFlags_Logarithmic)) {
+  if (ImGui::SliderFloat("##error", &lod, 0, 16, "%.2f",
+                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
     state.lod_pixels = static_cast<double>(lod);
     actions.changed = true;
   }
   nameWidget("error, pixels");
   hint("of what is drawn coarser than the data; 0 draws all of it");
-  actions.dragging |= ImGui::IsItemActive();
+  actions.dragging |= isDragged();
   int mebibytes = static_cast<int>(std::min<uint64_t>(state.memory_bytes >> 20, 1 << 30));
   label("memory, MiB");
-  if (ImGui::SliderInt("##memory", &mebibytes, 64, 65536, "%d", ImGuiSliderFlags_Logarithmic))
+  if (ImGui::SliderInt("##memory", &mebibytes, 64, 65536, "%d",
+                       ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
   actions.changed |= ImGui::IsItemDeactivatedAfterEdit();
   nameWidget("memory, MiB");

@@ -70,7 +70,7 @@ void opacitySlider(const char* text, const std::string& name, double& opacity, P
     opacity = static_cast<double>(value);
     actions.changed = true;
   }
-  actions.dragging |= ImGui::IsItemActive();
+  actions.dragging |= isDragged();
   nameWidget(name);
 }
 
@@ -96,7 +96,7 @@ bool drawHead(bool& visible, const std::string& title, glm::vec3* colour, const 
   ImGui::SameLine();
   if (colour) {
     actions.changed |= colourSwatch("##colour", glm::value_ptr(*colour), "colour of " + name);
-    actions.dragging |= ImGui::IsItemActive();
+    actions.dragging |= isDragged();
     ImGui::SameLine();
   }
   ImGui::AlignTextToFramePadding();
@@ -178,7 +178,7 @@ void CutPanel::drawClipBox(ViewState& state, PanelActions& actions) {
       state.clip_box->upper[axis] = static_cast<double>(std::max(lower, upper));
       actions.changed = true;
     }
-    actions.dragging |= ImGui::IsItemActive();
+    actions.dragging |= isDragged();
     nameWidget(fmt::format("clip {}", name));
     hint("drag to change; Ctrl + click to type a number");
   }
@@ -237,7 +237,7 @@ void CutPanel::drawPlane(ListedPlane& plane, const std::string& name, const View
     plane.point = middle + (place - centre) * scale.along;
     actions.changed = true;
   }
-  actions.dragging |= ImGui::IsItemActive();
+  actions.dragging |= isDragged();
   nameWidget(name);
   nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
   hint("drag it here or in the picture; Ctrl + click to type a number");
@@ -268,7 +268,7 @@ void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
     state.slice_opacity.factor = static_cast<double>(opacity);
     actions.changed = true;
   }
-  actions.dragging |= ImGui::IsItemActive();
+  actions.dragging |= isDragged();
   actions.changed |= ImGui::Checkbox("times the volume's", &state.slice_opacity.by_function);
   nameWidget("slices by function");
 }
@@ -428,7 +428,7 @@ void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelAc
                           ImGuiSliderFlags_AlwaysClamp))
     actions.changed = true;
   ImGui::EndDisabled();
-  actions.dragging |= ImGui::IsItemActive();
+  actions.dragging |= isDragged();
   nameWidget(name);
   hint("Ctrl + click to type a number");
 }
@@ -446,7 +446,7 @@ void SurfacePanel::drawColourOf(Isosurface& one, const std::string& name, const 
     one.colour = colour;
     actions.changed = true;
   }
-  actions.dragging |= ImGui::IsItemActive();
+  actions.dragging |= isDragged();
   ImGui::SameLine();
   bool is_of_function = !one.colour;
   if (ImGui::Checkbox("the function's", &is_of_function)) {

@@ -1,5 +1,6 @@
 #include "tools/view/history.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace curvisplat {
@@ -22,6 +23,10 @@ void History::record(const ViewState& state, const FilmEdit& film) {
   entries_.push_back(std::move(entry));
   if (entries_.size() > kMaxStates) entries_.erase(entries_.begin());
   at_ = entries_.size() - 1;
+}
+
+void History::raiseMemory(uint64_t bytes) {
+  for (Entry& entry : entries_) entry.state.memory_bytes = std::max(entry.state.memory_bytes, bytes);
 }
 
 }  // namespace curvisplat

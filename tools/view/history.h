@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -24,6 +25,8 @@ class History {
   /// Keeps a state at which the user rests: after a drag, not during it. What is equal to the newest is not
   /// kept; a state after an undo replaces what could be redone. The oldest of more than 200 are forgotten.
   void record(const ViewState& state, const FilmEdit& film);
+  /// Raises the memory of all states, since a limit that was raised for a picture is no step of the user's.
+  void raiseMemory(uint64_t bytes);
   bool canUndo() const { return at_ > 0; }
   bool canRedo() const { return at_ + 1 < entries_.size(); }
   /// The entry before or after; nullptr if there is none. Valid until the next record().

@@ -211,10 +211,11 @@ void CacheView::takeFrame() {
     frame = frames_->poll();
     if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
   } catch (const TooLittleMemory& error) {
-    if (raiseMemory(error)) return;
+    if (giveUpTint() || raiseMemory(error)) return;
     giveUpRequest();
     throw;
   } catch (const UsageError&) {  // of this request only
+    if (giveUpTint()) return;
     giveUpRequest();
     throw;
   } catch (...) {
@@ -245,6 +246,14 @@ void CacheView::takeFrame() {
   reportDamage();
 }
 
+/// Draws again without the faces at which the mouse points, if there are any: pointing has no lasting effects.
+bool CacheView::giveUpTint() {
+  if (pointed_faces_.empty()) return false;
+  not_tinted_.insert(std::exchange(pointed_faces_, {}));
+  changed_ = true;
+  return true;
+}
+
 /// Gives pictures more memory, where programs can have so much, and draws again. Returns whether it did: a limit that was
 /// given, or set below the usual one, stays.
 bool CacheView::raiseMemory(const TooLittleMemory& error) {
@@ -253,6 +262,7 @@ bool CacheView::raiseMemory(const TooLittleMemory& error) {
   if (!may_raise_memory_ || now < ViewState::kMemoryBytes || (available > 0 && wanted > available))
     return false;
   state_.memory_bytes = wanted;
+  history_.raiseMemory(wanted);
   changed_ = true;
   say(fmt::format("Pictures may take {} of memory now: this one needs more than {}.", byteText(wanted),
                   byteText(now)));
@@ -329,7 +339,6 @@ void CacheView::react(const WindowLayout& layout) {
   changed_ |= navigated;
   PanelActions actions;
   if (layout.shows_panels) actions = drawPanels(layout);
-  film_.follow(state_.scale);  // which the panels may have changed
   if (isSeries()) drawTimeBar(cache_, playback_, layout.time, actions);
   reports_.attempt([&] { apply(actions); });
   if (state_.giveOpacitiesBack()) {
@@ -337,6 +346,7 @@ void CacheView::react(const WindowLayout& layout) {
     ++function_version_;
     changed_ = true;
   }
+  reports_.attempt([&] { film_.follow(state_.scale); });  // which panels and saved views may have changed
   if (isShown()) changed_ |= playback_.tick(clockSeconds());
   if (isShown() && film_.tick(clockSeconds()))
     reports_.attempt([&] { showFilm(film_.film()->functionsChange()); });
@@ -380,7 +390,8 @@ void CacheView::apply(const PanelActions& actions) {
     chooser_.ask({FunctionChooser::For::kOpacities, state_.opacity_by->variable});
   if (actions.add_faces) addFaces(*actions.add_faces);
   // What is saved has no tint.
-  const std::string pointed = save_to_ || actions.add_faces ? "" : actions.pointed_faces;
+  const bool tints = !save_to_ && !actions.add_faces && !not_tinted_.contains(actions.pointed_faces);
+  const std::string pointed = tints ? actions.pointed_faces : "";
   changed_ |= pointed != std::exchange(pointed_faces_, pointed);
   if (actions.colour_faces) colourFaces(*actions.colour_faces);
   if (actions.isosurface_scalar)

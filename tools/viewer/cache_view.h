@@ -148,6 +148,7 @@ class CacheView {
   void drawFilmPictures();
   MovieRequest filmMovie(const std::filesystem::path& file, std::vector<double> times) const;
   std::optional<double> seriesTime() const;
+  bool giveUpTint();
   bool raiseMemory(const TooLittleMemory& error);
   void giveUpSaving();
   void giveUpRequest();
@@ -213,7 +214,8 @@ class CacheView {
   History history_;
   Panels panels_;
   PlaneHandles handles_;
-  bool shows_frames_ = true;   // of clip planes, slices and the clip box
+  bool shows_frames_ = true;          // of clip planes, slices and the clip box
+  std::set<std::string> not_tinted_;  // faces with which the picture could not be drawn
   std::string pointed_faces_;  // that are tinted, since the mouse points at them in a list; empty: none
   Playback playback_;
   Navigation navigation_;

@@ -38,6 +38,8 @@ KeyboardFocus& keyboardFocus() {
 
 void KeyboardFocus::beginFrame(std::span<const int> pressed) {
   stops_before_ = std::exchange(stops_, {});
+  offered_.clear();
+  had_ring_ = std::exchange(has_ring_, false);
   const ImGuiContext& g = *ImGui::GetCurrentContext();
   const ImGuiIO& io = g.IO;
   if (std::ranges::any_of(io.MouseClicked, [](bool clicked) { return clicked; })) is_shown_ = false;
@@ -105,7 +107,7 @@ bool KeyboardFocus::offer(ImGuiID part) {
   const ImGuiLastItemData& item = ImGui::GetCurrentContext()->LastItemData;
   const ImGuiID id = part != 0 ? part : item.ID;
   if (id == 0 || (item.InFlags & ImGuiItemFlags_Disabled) != 0) return false;
-  if (std::ranges::find(stops_, id, &Stop::id) != stops_.end()) return false;
+  if (!offered_.insert(id).second) return false;
   stops_.push_back({id, ImGui::GetCurrentWindow(), item.Rect.Min, item.Rect.Max,
                     (item.InFlags & ImGuiItemFlags_Inputable) != 0});
   if (!is_shown_ || id != focused_) return false;
@@ -113,6 +115,7 @@ bool KeyboardFocus::offer(ImGuiID part) {
   ImGui::GetWindowDrawList()->AddRect(
       {item.Rect.Min.x + half, item.Rect.Min.y + half}, {item.Rect.Max.x - half, item.Rect.Max.y - half},
       ImGui::GetColorU32(ImGuiCol_NavHighlight), ImGui::GetStyle().FrameRounding, 0, width);
+  has_ring_ = true;
   return true;
 }
 

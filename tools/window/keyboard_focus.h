@@ -9,6 +9,7 @@
 
 #include <optional>
 #include <span>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -23,8 +24,8 @@ class KeyboardFocus {
   /// Lets Tab stop at the item that Dear ImGui drew last, unless it is disabled or has no identifier. Returns whether it has the
   /// focus, and draws its ring then. `part`: the identifier of what is pressed of a group.
   bool offer(ImGuiID part = 0);
-  /// Whether a widget has the ring, so that Space and Return are for it.
-  bool isShown() const { return is_shown_; }
+  /// Whether a widget had the ring in the last frame, so that Space and Return are for it.
+  bool isShown() const { return is_shown_ && had_ring_; }
 
  private:
   struct Stop {
@@ -38,11 +39,14 @@ class KeyboardFocus {
   void press() const;
 
   std::vector<Stop> stops_, stops_before_;  // of this frame, and of the last one
+  std::unordered_set<ImGuiID> offered_;     // the identifiers in stops_
   ImGuiID focused_ = 0;
   size_t place_ = 0;  // of the focused one among the stops, when Tab came there
   std::optional<std::pair<ImGuiID, size_t>>
       below_;  // what had the focus before a list or a dialog was opened
   bool is_shown_ = false;
+  bool has_ring_ = false,
+       had_ring_ = false;  // whether a widget was drawn with it in this frame, and in the last one
 };
 
 /// The one of the window.

@@ -124,14 +124,22 @@ bool colourSwatch(const char* label, float* rgb, const std::string& name) {
   return changed;
 }
 
+bool isDragged() {
+  return ImGui::IsItemActive() && !ImGui::GetIO().WantTextInput;
+}
+
 bool dragEnds(const char* label, float& low, float& high, const DraggedEnds& ends) {
-  const auto [speed, lowest, highest, low_format, high_format] = ends;
-  return drawBeside(label, 2, [&](size_t n) {
-    return n == 0 ? ImGui::DragFloat("", &low, speed, lowest, std::min(highest, high), low_format,
-                                     ImGuiSliderFlags_AlwaysClamp)
-                  : ImGui::DragFloat("", &high, speed, std::max(lowest, low), highest, high_format,
-                                     ImGuiSliderFlags_AlwaysClamp);
+  const bool changed = drawBeside(label, 2, [&](size_t n) {
+    return n == 0 ? ImGui::DragFloat("", &low, ends.speed, ends.lowest, std::min(ends.highest, high),
+                                     ends.low_format, ImGuiSliderFlags_AlwaysClamp)
+                  : ImGui::DragFloat("", &high, ends.speed, std::max(ends.lowest, low), ends.highest,
+                                     ends.high_format, ImGuiSliderFlags_AlwaysClamp);
   });
+  if (changed) {  // Dear ImGui does not clamp where both bounds are equal
+    low = std::clamp(low, ends.lowest, ends.highest);
+    high = std::clamp(high, low, ends.highest);
+  }
+  return changed;
 }
 
 std::optional<std::array<double, TypedNumbers::kMax>> TypedNumbers::draw(const char* label,

@@ -42,6 +42,9 @@ class TypedNumbers {
 bool colourSwatch(const char* label, float* rgb, const std::string& name);
 
 /// The two ends of a range that are dragged: how far per pixel, the ends of both, and printf's formats.
+/// Whether the widget that was drawn last is held, and not a field into which a number is typed.
+bool isDragged();
+
 struct DraggedEnds {
   float speed, lowest, highest;
   const char *low_format, *high_format;

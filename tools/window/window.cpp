@@ -117,6 +117,7 @@ class SharedContext final : public GlSharing {
     if (!hidden_) throw Error("no second context for the window: {}", why_none_);
     if (is_lent_.exchange(true)) throw Error("the window's second context is in use");
     auto lent = std::make_unique<Lent>(*this);
+    if (!lent->isCurrent()) throw Error("the window's second context cannot be used: {}", last_glfw_error);
     return std::make_unique<Context>(std::move(lent), bin_);
   }
 
@@ -124,6 +125,7 @@ class SharedContext final : public GlSharing {
   /// The context while it is current on a painter's thread.
   struct Lent {
     explicit Lent(SharedContext& of) : owner(of) { glfwMakeContextCurrent(owner.hidden_); }
+    bool isCurrent() const { return glfwGetCurrentContext() == owner.hidden_; }
     ~Lent() {
       glfwMakeContextCurrent(nullptr);
       owner.is_lent_ = false;
