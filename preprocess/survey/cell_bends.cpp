@@ -34,9 +34,6 @@ constexpr uint64_t kSmallGrid = 100'000;  // nodes
 // blocks that deviate by more are halved along all axes.
 constexpr double kMaxDeviationOfTiny = 0.3;
 constexpr uint64_t kTinyGrid = 10'000;  // nodes
-// Small grids of which more nodes are at steps are halved. A sea with 7 % has an rms deviation of 1.7 %, of 0.9 % if it is
-// halved; squares go with the share.
-constexpr double kMaxAtSteps = 0.025;
 constexpr uint64_t kLargeGrid = 1'000'000;
 // A large grid's survey takes a few percent of a conversion.
 constexpr uint64_t kSampledNodes = 2'000'000;
@@ -62,8 +59,6 @@ double remains(size_t component, size_t pair, const CellCuts& cuts) {
 /// Sums over nodes, not yet divided by the volume.
 BlockBends sum(BlockBends a, const BlockBends& b) {
   a.volume += b.volume;
-  a.nodes += b.nodes;
-  a.at_steps += b.at_steps;
   for (size_t c = 0; c < 3; ++c)
     for (size_t pair = 0; pair < 6; ++pair) a.squares[c][pair] += b.squares[c][pair];
   return a;
@@ -84,15 +79,10 @@ class SecondDifferences {
       // Beside the outer planes only where there are no others: they have one neighbour.
       if (counts_[axis] > 2 && (before[axis] == 0 || after[axis] == 0)) return;
     }
-    if (nodes_.blank[at] != 0) return;
-    ++sums.nodes;
     for (const ptrdiff_t i : {before[0], ptrdiff_t{0}, after[0]})
       for (const ptrdiff_t j : {before[1], ptrdiff_t{0}, after[1]})
         for (const ptrdiff_t k : {before[2], ptrdiff_t{0}, after[2]})
-          if (nodes_.blank[at + static_cast<size_t>(i + j + k)] != 0) {
-            sums.at_steps += isStep(at, before, after);
-            return;
-          }
+          if (nodes_.blank[at + static_cast<size_t>(i + j + k)] != 0) return;
     const auto position = [&](ptrdiff_t step) {
       const size_t n = at + static_cast<size_t>(step);
       return glm::dvec3(nodes_.x[n], nodes_.y[n], nodes_.z[n]);
@@ -130,31 +120,6 @@ class SecondDifferences {
   }
 
  private:
-  /// Whether some of the cells around a node are there, which fill no box.
-  bool isStep(size_t at, const std::array<ptrdiff_t, 3>& before,
-              const std::array<ptrdiff_t, 3>& after) const {
-    uint32_t there = 0;
-    std::array<uint32_t, 3> sides{};  // [axis] of the node, on which there are cells: bits
-    for (uint32_t cell = 0; cell < 8; ++cell) {
-      bool whole = true;
-      for (uint32_t corner = 1; corner < 8; ++corner) {
-        ptrdiff_t step = 0;
-        for (size_t axis = 0; axis < 3; ++axis)
-          if ((corner >> axis & 1) != 0) step += (cell >> axis & 1) != 0 ? after[axis] : before[axis];
-        whole &= nodes_.blank[at + static_cast<size_t>(step)] == 0;
-      }
-      if (!whole) continue;
-      there |= 1u << cell;
-      for (size_t axis = 0; axis < 3; ++axis) sides[axis] |= 1u << (cell >> axis & 1);
-    }
-    uint32_t box = 0;
-    for (uint32_t cell = 0; cell < 8; ++cell) {
-      bool inside = true;
-      for (size_t axis = 0; axis < 3; ++axis) inside &= (sides[axis] >> (cell >> axis & 1) & 1) != 0;
-      if (inside) box |= 1u << cell;
-    }
-    return there != box;
-  }
   /// Whether a column of cells, from the node along two axes, has cells with three corners: where three blocks meet.
   /// Their parts would be as pointed as they are.
   template <class Position>
@@ -268,11 +233,10 @@ class CutChoice {
     }
   }
 
-  /// Halves the cells of blocks that need it along the axes that are not cut. `most`: nodes.
-  template <typename Needs>
-  void halveWhole(const Needs& needs, uint64_t most) {
+  /// Halves the cells of blocks that deviate by more than `max` along the axes that are not cut. `most`: nodes.
+  void halveWhole(double max, uint64_t most) {
     for (uint32_t block = 0; block < blocks_.size(); ++block) {
-      if (!needs(bends_[block])) continue;
+      if (!(bends_[block].deviation() > max)) continue;
       for (const uint32_t of_class : classes_[block]) {
         if (of_classes_[of_class] > 1) continue;
         of_classes_[of_class] = 2;
@@ -356,17 +320,6 @@ class CutChoice {
   std::vector<std::vector<uint32_t>> blocks_of_;  // [class]
 };
 
-bool endsInSteps(const BlockBends& of_block) {
-  return static_cast<double>(of_block.at_steps) > kMaxAtSteps * static_cast<double>(of_block.nodes);
-}
-
-/// The first scalar at nodes: its values say where there is data. Empty if there is none.
-std::vector<uint32_t> scalarAtNodes(const GridDescription& description) {
-  for (uint32_t n = 0; n < description.scalars.size(); ++n)
-    if (description.scalars[n].centring == Centring::kNode) return {n};
-  return {};
-}
-
 }  // namespace
 
 double BlockBends::deviation(const CellCuts& cuts) const {
@@ -376,13 +329,12 @@ double BlockBends::deviation(const CellCuts& cuts) const {
   return std::sqrt(sum);
 }
 
-std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes, std::vector<uint32_t> blanking,
-                                     std::optional<double> blank_value) {
+std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes) {
   const std::vector<GridBlock>& blocks = source.description().blocks;
   std::vector<BlockBends> bends(blocks.size());
   const uint64_t one_in = std::max<uint64_t>((nodesOf(blocks) + nodes - 1) / nodes, 1);
-  const NodeReader reader(source, std::move(blanking), blank_value);
-  SlabStream stream(reader, kWindowNodes * slabBytesPerNode(reader.scalars()),
+  const NodeReader reader(source, {}, std::nullopt);
+  SlabStream stream(reader, kWindowNodes * slabBytesPerNode(0),
                     sampleOf(cutIntoSlabs(blocks, kWindowNodes, kNodeHalo), one_in));
   while (const LoadedSlab* loaded = stream.next()) {
     BlockBends& of_block = bends[loaded->slab.block];
@@ -395,29 +347,22 @@ std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes, s
   return bends;
 }
 
-Refinement refinementByNeed(const GridSource& source, std::optional<double> blank_value) {
+Refinement refinementByNeed(const GridSource& source) {
   const std::vector<GridBlock>& blocks = source.description().blocks;
   const uint64_t nodes = nodesOf(blocks);
   if (nodes > kMaxCutByNeed) return {};
-  const bool few = nodes <= kSmallGrid;
-  const std::vector<BlockBends> bends =
-      few ? measureBends(source, kSampledNodes, scalarAtNodes(source.description()), blank_value)
-          : measureBends(source, kSampledNodes);
+  const std::vector<BlockBends> bends = measureBends(source, kSampledNodes);
   const double deviation = deviationOf(bends);
-  const bool small = few && deviation > kMaxDeviationOfSmall;
+  const bool small = nodes <= kSmallGrid && deviation > kMaxDeviationOfSmall;
   const bool tiny = nodes <= kTinyGrid && blocks.size() > 1 && deviation > kMaxDeviationOfTiny;
   const double max = small ? kMaxDeviationOfSmall : kMaxDeviation;
   const bool shows =
       std::ranges::any_of(bends, [max](const BlockBends& of_block) { return of_block.deviation() > max; });
-  const bool stepped = few && std::ranges::any_of(bends, endsInSteps);
-  if (!shows && !tiny && !stepped) return {};
+  if (!shows && !tiny) return {};
   const uint64_t most = nodes > kLargeGrid ? nodes + nodes / 2 : 8 * nodes;
   CutChoice choice(blocks, bends, joinedAxes(source), max);
   choice.cutByNeed(most);
-  if (tiny)
-    choice.halveWhole([](const BlockBends& of_block) { return of_block.deviation() > kMaxDeviationOfTiny; },
-                      most);
-  if (stepped) choice.halveWhole(endsInSteps, most);
+  if (tiny) choice.halveWhole(kMaxDeviationOfTiny, most);
   return choice.chosen();
 }
 

@@ -14,14 +14,12 @@
 //
 // The root of the sum of their mean squares, weighted (cell_bends.cpp), is about the rms deviation of a uniform
 // medium's optical depth in %: bench/README.md, "Real grids", has measured ones beside it. What borders and
-// joints of blocks add is not measured, but how many nodes are at steps, where the cells around them that are there
-// fill no box: a sea's floor. What is left of such a splat is cut at one face; steps of halved cells are half as long. A second difference across kinked joints was tried: it finds 0.7 to 1.1 where
+// joints of blocks add is not measured; a second difference across kinked joints was tried: it finds 0.7 to 1.1 where
 // 1.1 to 1.7 are drawn, and takes cuts from where they help more (of the O-grid of 79 blocks 0.5 would become 1.0).
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,7 +31,6 @@ namespace curvisplat {
 /// Means of the squares of T over the nodes of a block, by volume and weighted.
 struct BlockBends {
   double volume = 0;
-  uint64_t nodes = 0, at_steps = 0;  // inside of the block
   /// [component][pair of axes: ii, jj, kk, jk, ki, ij]
   std::array<std::array<double, 6>, 3> squares{};
 
@@ -42,20 +39,17 @@ struct BlockBends {
 };
 
 /// Measures the blocks of a grid: all nodes if it has at most `nodes`, or else some slabs of each block. What is
-/// found depends neither on threads nor on memory. Takes 40 MB. Nodes are missing where the grid
-/// blanks them, and where a value of `blanking` (scalars at nodes) is `blank_value` or not finite. Throws Error if the grid cannot be read.
-std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes,
-                                     std::vector<uint32_t> blanking = {},
-                                     std::optional<double> blank_value = {});
+/// found depends neither on threads nor on memory. Takes 40 MB. Throws Error if the grid cannot be read.
+std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes);
 
 /// Grids with more nodes are not cut by need: their cells are smaller than pixels.
 inline constexpr uint64_t kMaxCutByNeed = 16'000'000;
 
 /// Chooses for each block, along each axis, into 1, 2, 4 or 8 parts its cells should be cut, so that a picture
 /// does not show them (kMaxDeviation), with at most 8 times the nodes, or 1.5 times in grids of more than a
-/// million. Small grids that end in steps, at what is blanked, are halved. Blocks that share the nodes of a face or an edge have
-/// as many parts along it. Throws Error if the grid cannot be read.
-Refinement refinementByNeed(const GridSource& source, std::optional<double> blank_value = {});
+/// million. Blocks that share the nodes of a face or an edge have as many parts along it. Throws Error if the
+/// grid cannot be read.
+Refinement refinementByNeed(const GridSource& source);
 
 /// A line for users if a picture of the grid will show its cells: what helps. Otherwise empty. `by_need`: whether
 /// refinementByNeed() has chosen its cuts. Looks at some slabs of large grids only. Throws Error if the grid cannot be

@@ -195,33 +195,6 @@ TEST(RefinementByNeed, HalvesAllCellsOfFewThatMeetAtAnAngle) {
   EXPECT_FALSE(refinementByNeed(*many).cutsCells());
 }
 
-TEST(RefinementByNeed, HalvesSmallGridsThatEndInSteps) {
-  // A sea with a floor of steps, which values that are missing or blanked cut out of cubes: no cell bends.
-  const auto sea = [](uint64_t along, float land, bool steps) {
-    return std::make_unique<FunctionGridSource>(
-        std::vector{gridBlock(along, 15, 12)}, 1, [=](const GridNode& node) {
-          const uint64_t floor = steps ? 3 + (node.i / 2 + node.j) % 5 : 3;
-          return NodeValues{
-              {static_cast<double>(node.i), static_cast<double>(node.j), static_cast<double>(node.k)},
-              {node.k < floor ? land : 1.0f}};
-        });
-  };
-  const float missing = std::numeric_limits<float>::quiet_NaN();
-  for (const auto& [land, blank_value] :
-       {std::pair{missing, std::optional<double>()}, std::pair{-99.0f, std::optional(-99.0)}}) {
-    const auto small = sea(20, land, true), large = sea(900, land, true);
-    EXPECT_EQ(refinementByNeed(*small, blank_value).ofBlock(0), (CellCuts{2, 2, 2}));
-    EXPECT_FALSE(refinementByNeed(*large, blank_value).cutsCells());
-  }
-  EXPECT_FALSE(refinementByNeed(*sea(20, -99, true)).cutsCells());  // these values are data
-
-  const auto count = [&](bool steps) { return measureBends(*sea(20, missing, steps), kAll, {0}).at(0); };
-  EXPECT_EQ(count(false).nodes, 18u * 13 * (11 - 3)) << "inside of the block, above a level floor";
-  EXPECT_EQ(count(false).at_steps, 0u);
-  EXPECT_EQ(count(true).at_steps, 301u)
-      << "counted by numpy: the cells around a node that are there are no box";
-}
-
 TEST(RefinementByNeed, KeepsToItsBounds) {
   // Cells that no cut makes even.
   const auto wild =

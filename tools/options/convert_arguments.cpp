@@ -230,8 +230,7 @@ std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments,
   if (const auto refinement = refinementOf(arguments, cache))
     return refinedBy(*refinement, std::move(source), arguments.blank_value);
   const auto parts = parseRefinement("--refine", arguments.refine.value_or(kByNeed));
-  const Refinement refinement =
-      parts ? Refinement(*parts) : refinementByNeed(*source, arguments.threads, arguments.blank_value);
+  const Refinement refinement = parts ? Refinement(*parts) : refinementByNeed(*source, arguments.threads);
   return refinedBy(refinement, std::move(source), arguments.blank_value);
 }
 
@@ -248,11 +247,11 @@ std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_
   return refined(std::move(grid), refinement, blank_value);
 }
 
-Refinement refinementByNeed(const DataSource& source, unsigned threads, std::optional<double> blank_value) {
+Refinement refinementByNeed(const DataSource& source, unsigned threads) {
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   if (!grid) return {};
   const ConversionThreads bound(threadsFor(threads));
-  Refinement refinement = refinementByNeed(*grid, blank_value);
+  Refinement refinement = refinementByNeed(*grid);
   returnFreedMemory();
   return refinement;
 }
@@ -267,8 +266,7 @@ std::string noteOnCuts(const GridDescription& description, std::string_view how_
     in_files += (i + 1) * (j + 1) * (k + 1);
   }
   return fmt::format(
-      "cells that bend, grow steeply or end in steps are cut: {} nodes of the files become {}; {} leaves "
-      "them whole",
+      "cells that bend or grow steeply are cut: {} nodes of the files become {}; {} leaves them whole",
       in_files, nodes, how_to_avoid);
 }
 

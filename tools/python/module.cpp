@@ -188,9 +188,7 @@ std::unique_ptr<DataSource> refinedAs(const py::dict& given_options, std::unique
   const auto threads = py::cast<unsigned>(given_options["threads"]);
   const auto parts = parseRefinement("refine", refinementOf(given_options));
   Refinement refinement(parts.value_or(1));
-  if (!parts)
-    runInterruptibly(progress,
-                     [&](Progress&) { refinement = refinementByNeed(*source, threads, blank_value); });
+  if (!parts) runInterruptibly(progress, [&](Progress&) { refinement = refinementByNeed(*source, threads); });
   return refinedBy(refinement, std::move(source), blank_value);
 }
 
