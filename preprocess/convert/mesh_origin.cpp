@@ -134,15 +134,13 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
   const TakeSplat take = [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
     sink_of_thread().add(splat, values);
   };
-  const std::optional<Globe>& globe = description().globe;
-  const CellSpace space = globe && globe->sphere() ? CellSpace::kSphere : CellSpace::kFlat;
   PointSums::Counts counts;
   if (centring() == Centring::kCell) {
-    CellSlopes slopes(reader_.cells(), reader_.scalars(), half, scratch_, space);
+    CellSlopes slopes(reader_.cells(), reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { slopes.add(cells); });
     counts = slopes.finish(take, slabs_, progress);
   } else {
-    PointSums sums(reader_.points(), drawn_cells_, reader_.scalars(), half, scratch_, space);
+    PointSums sums(reader_.points(), drawn_cells_, reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { sums.add(cells); });
     counts = sums.finish(take, progress);
   }

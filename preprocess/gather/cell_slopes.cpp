@@ -160,8 +160,7 @@ class RangeOfCells {
 };
 
 /// Sets the bodies of cells [begin, end).
-void setBodies(const FlattenedCells& measured, size_t begin, size_t end, std::span<CellBody> out) {
-  const GatheredCells& cells = measured.cells();
+void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<CellBody> out) {
   for (size_t n = begin; n < end;) {
     if (cells.areFourAlike(n, end, 0)) {
       setBodiesOfFour(cells.viewsOfFour(n, 0), out.subspan(n, kCellsAtOnce));
@@ -173,18 +172,12 @@ void setBodies(const FlattenedCells& measured, size_t begin, size_t end, std::sp
   }
   for (size_t n = begin; n < end; ++n)
     if (const double volume = cells.volumeOf(n); volume > 0 && out[n].volume > 0) out[n].volume = volume;
-  for (size_t n = begin; n < end && measured.flattened(); ++n)
-    if (cells.shapes[n] != CellKind::kNone) out[n] = inSpace(out[n], measured.frame(n));
 }
 
 }  // namespace
 
-CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch,
-                       CellSpace space)
-    : cells_(cells),
-      fields_(fields),
-      range_cells_(sharesOf(cells, fields, memory_bytes).range_cells),
-      space_(space) {
+CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch)
+    : cells_(cells), fields_(fields), range_cells_(sharesOf(cells, fields, memory_bytes).range_cells) {
   const Shares shares = sharesOf(cells, fields, memory_bytes);
   const RecordBytes records = recordBytes(fields);
   const uint64_t ranges = std::max<uint64_t>(1, (cells + range_cells_ - 1) / range_cells_);
@@ -216,12 +209,11 @@ CellSlopes::~CellSlopes() = default;
 
 void CellSlopes::add(const GatheredCells& cells) {
   of_cells_.resize(cells.size());
-  measured_.assign(cells, space_, FlattenedCells::Volumes::kKept);
-  parallelInvoke([&] { list_.assign(measured_.cells()); },
+  parallelInvoke([&] { list_.assign(cells); },
                  [&] {
                    parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
                                [&](const tbb::blocked_range<size_t>& part) {
-                                 setBodies(measured_, part.begin(), part.end(), of_cells_);
+                                 setBodies(cells, part.begin(), part.end(), of_cells_);
                                });
                  });
   parallelInvoke([&] { addFaces(cells); }, [&] { addBodies(cells); });
@@ -245,7 +237,7 @@ void CellSlopes::addFaces(const GatheredCells& cells) {
   faces_->add(
       list_.corners,
       {[&](size_t n, std::span<std::byte> to) {
-         const HalfFace face = measured_.inSpace(list_.face(measured_.cells(), n));
+         const HalfFace face = list_.face(cells, n);
          put(to.data(),
              FaceRecord{cells.numbers[face.cell], of_cells_[face.cell].centre, face.inward, face.centre},
              valuesOf(cells, face.cell));
@@ -309,14 +301,8 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, SlabCells slabs
       cells.values(n, own);
       cells.neighbours(n, steps, others);
       if (!(body.body.volume > 0)) ++flat;
-      if (space_ == CellSpace::kSphere) {
-        const SphereFrame here(body.body.centre);
-        for (glm::dvec3& step : steps) step = here.flat(body.body.centre + step) - body.body.centre;
-      }
       splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
-      planes.of(body.cell, of_border);
-      if (space_ == CellSpace::kSphere) flattenAt(splat.splat.position, of_border);
-      const std::span<const OuterPlane> faces = of_border;
+      const std::span<const OuterPlane> faces = planes.of(body.cell, of_border);
       ++made;
       if (slabs == SlabCells::kHalved && halveSlab(faces, splat, values, halves)) {
         ++cut;
@@ -341,7 +327,6 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, SlabCells slabs
 
 PointSums::Counts CellSlopes::finish(const TakeSplat& take, SlabCells slabs, const Progress& progress) {
   list_ = {};
-  measured_ = {};
   freeMemory(of_cells_);
   bodies_->close();
   const auto join = [&](std::span<const std::byte> first, std::span<const std::byte> second) {

@@ -26,8 +26,7 @@ enum class SlabCells { kWhole, kHalved };
 class CellSlopes {
  public:
   /// Takes cells with numbers below `cells`; `fields`: at least one value each.
-  CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch,
-             CellSpace space = CellSpace::kFlat);
+  CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const ScratchFiles& scratch);
   ~CellSlopes();
 
   /// How a pass shares its memory.
@@ -64,8 +63,6 @@ class CellSlopes {
   std::unique_ptr<FaceMatcher> faces_;
   std::unique_ptr<OuterPlanes> planes_;
   FaceList list_;
-  const CellSpace space_;
-  FlattenedCells measured_;
   std::vector<CellBody> of_cells_;  // that are added
   std::vector<std::byte> neighbour_;
 };

@@ -167,10 +167,9 @@ FaceRecord recordOf(const GatheredCells& cells, const HalfFace& face) {
 }  // namespace
 
 PointBorders::PointBorders(uint64_t points, uint64_t range_points, uint64_t cells, uint64_t memory_bytes,
-                           const ScratchFiles& scratch, CellSpace space)
+                           const ScratchFiles& scratch)
     : faces_(sizeof(FaceRecord), cells * kFacesOfCell, memory_bytes / 2, scratch),
-      planes_((points + range_points - 1) / range_points, range_points, memory_bytes / 2, scratch),
-      space_(space) {}
+      planes_((points + range_points - 1) / range_points, range_points, memory_bytes / 2, scratch) {}
 
 uint64_t PointBorders::waitingBytes(uint64_t cells) {
   return FaceMatcher::waitingBytes(sizeof(FaceRecord), cells * kFacesOfCell);
@@ -181,17 +180,15 @@ size_t PointBorders::faceBytes() {
 }
 
 void PointBorders::add(const GatheredCells& cells) {
-  measured_.assign(cells, space_, FlattenedCells::Volumes::kNone);
-  list_.assign(measured_.cells());
+  list_.assign(cells);
   faces_.add(list_.corners, {[&](size_t n, std::span<std::byte> to) {
-               const FaceRecord record = recordOf(cells, measured_.inSpace(list_.face(measured_.cells(), n)));
+               const FaceRecord record = recordOf(cells, list_.face(cells, n));
                std::memcpy(to.data(), &record, sizeof record);
              }});
 }
 
 void PointBorders::finish(const Progress& progress) {
   list_ = {};
-  measured_ = {};
   uint64_t face = 0;
   faces_.finish([](std::span<const std::byte>, std::span<const std::byte>) {},
                 [&](std::span<const std::byte> bytes) {

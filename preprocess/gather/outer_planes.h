@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "preprocess/gather/face_matcher.h"
-#include "preprocess/gather/flattened_cells.h"
 #include "preprocess/gather/streams_file.h"
 #include "preprocess/moments/mesh_splats.h"
 #include "stream/base/progress.h"
@@ -64,7 +63,7 @@ class PointBorders {
  public:
   /// Sorts by ranges of `range_points` numbers. `cells`: about how many there will be.
   PointBorders(uint64_t points, uint64_t range_points, uint64_t cells, uint64_t memory_bytes,
-               const ScratchFiles& scratch, CellSpace space = CellSpace::kFlat);
+               const ScratchFiles& scratch);
 
   /// Cells in the mesh's order.
   void add(const GatheredCells& cells);
@@ -82,8 +81,6 @@ class PointBorders {
   FaceMatcher faces_;
   OuterPlanes planes_;
   FaceList list_;
-  const CellSpace space_;
-  FlattenedCells measured_;
 };
 
 }  // namespace curvisplat

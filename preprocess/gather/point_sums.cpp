@@ -51,31 +51,9 @@ void scaleTo(double volume, size_t stride, std::span<double> moments) {
     for (double& moment : moments) moment *= volume / flat;
 }
 
-/// Turns moments about a point from the one frame to the other.
-void turn(const glm::dmat3& by, size_t fields, std::span<double> m) {
-  const auto turnVector = [&](double* v) {
-    const glm::dvec3 turned_vector = by * glm::dvec3(v[0], v[1], v[2]);
-    for (int n = 0; n < 3; ++n) v[n] = turned_vector[n];
-  };
-  turnVector(&m[1]);
-  const Symmetric3 second = turned({m[4], m[5], m[6], m[7], m[8], m[9]}, by);
-  const double numbers[] = {second.xx, second.xy, second.yy, second.xz, second.yz, second.zz};
-  std::ranges::copy(numbers, &m[4]);
-  for (size_t field = 0; field < fields; ++field) turnVector(&m[10 + 5 * field + 1]);
-}
-
-/// Cells as they are measured, and as they are.
-struct MeasuredCells {
-  const FlattenedCells& measured;
-  const GatheredCells& cells;
-};
-
-/// The moments of cells [begin, end), in the frame of each corner if they are flattened; `out`: [corner of the first cell
-/// ...][moment].
-void momentsOf(const MeasuredCells& of, size_t begin, size_t end, size_t fields, DualScratch& scratch,
+/// The moments of cells [begin, end); `out`: [corner of the first cell ...][moment].
+void momentsOf(const GatheredCells& cells, size_t begin, size_t end, size_t fields, DualScratch& scratch,
                std::span<double> out) {
-  const FlattenedCells& measured = of.measured;
-  const GatheredCells& cells = measured.cells();
   const size_t stride = momentCount(fields);
   const auto outOf = [&](size_t first, size_t last) {
     const size_t from = cells.corner_begin[first] - cells.corner_begin[begin];
@@ -95,28 +73,19 @@ void momentsOf(const MeasuredCells& of, size_t begin, size_t end, size_t fields,
   }
   for (size_t n = begin; n < end; ++n)
     if (const double volume = cells.volumeOf(n); volume > 0) scaleTo(volume, stride, outOf(n, n + 1));
-  if (!measured.flattened()) return;
-  for (size_t n = begin; n < end; ++n) {
-    if (cells.shapes[n] == CellKind::kNone) continue;
-    const std::span<double> of_cell = outOf(n, n + 1);
-    for (size_t corner = cells.corner_begin[n], m = 0; corner < cells.corner_begin[n + 1];
-         ++corner, m += stride)
-      turn(measured.frame(n).turnTo(SphereFrame(of.cells.at[corner])), fields, of_cell.subspan(m, stride));
-  }
 }
 
 }  // namespace
 
 PointSums::PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
-                     const ScratchFiles& scratch, CellSpace space)
+                     const ScratchFiles& scratch)
     : points_(points),
       fields_(fields),
-      space_(space),
       shares_(sharesOf(cells, fields, memory_bytes)),
       scratch_(scratch),
       sums_(std::make_unique<SumPages>(points, fields, momentCount(fields), shares_.pages, scratch)),
       borders_(std::make_unique<PointBorders>(points, shares_.range_points, cells, shares_.border_bytes,
-                                              scratch, space)) {}
+                                              scratch)) {}
 
 PointSums::Shares PointSums::sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes) {
   Shares shares{};
@@ -200,7 +169,6 @@ void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) 
   // Each looks at all corners. A power of two: dividing by another number takes as long as adding moments.
   const size_t stripes = threads == 1 ? 1 : std::bit_ceil(2 * threads);
   tbb::enumerable_thread_specific<DualScratch> scratch;
-  measured_.assign(cells, space_, FlattenedCells::Volumes::kKept);
   for (size_t begin = 0; begin < cells.size();) {
     size_t end = begin + 1;
     const size_t first_corner = cells.corner_begin[begin];
@@ -210,7 +178,7 @@ void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) 
     parallelFor(tbb::blocked_range<size_t>(begin, end, kCellsPerTask),
                 [&](const tbb::blocked_range<size_t>& part) {
                   const size_t from = cells.corner_begin[part.begin()] - first_corner;
-                  momentsOf({measured_, cells}, part.begin(), part.end(), fields_, scratch.local(),
+                  momentsOf(cells, part.begin(), part.end(), fields_, scratch.local(),
                             std::span(moments_).subspan(from * stride));
                 });
     // Each point's sum has the order of the cells, whoever adds them. A page is summed by one task.
@@ -243,34 +211,27 @@ void PointSums::flushRange(const PointRange& range, const OuterPlanes::OfRange& 
                            Counts& counts) {
   const size_t stride = momentCount(fields_);
   std::atomic<uint64_t> splats = 0, degenerate = 0;
-  parallelFor(
-      tbb::blocked_range<uint64_t>(range.first, range.end, 1024),
-      [&](const tbb::blocked_range<uint64_t>& part) {
-        const TraceScope trace("splats of points");
-        NodeSplat splat;
-        std::vector<SplatScalar> values(fields_);
-        std::vector<OuterPlane> of_point;
-        uint64_t made = 0, flat = 0;
-        for (uint64_t point = part.begin(); point < part.end(); ++point) {
-          const double* const sums = sums_->sums(point);
-          if (std::isnan(sums[0])) continue;
-          const std::span<const double> moments(sums + 3, stride);
-          if (!(moments[0] > 0)) ++flat;
-          const glm::dvec3 at(sums[0], sums[1], sums[2]);
-          const bool on_sphere = space_ == CellSpace::kSphere;
-          splatOfPoint(
-              point,
-              {at, {sums_->values(point), fields_}, moments, on_sphere ? SphereFrame(at) : SphereFrame()},
-              splat, values);
-          planes.of(point, of_point);
-          if (on_sphere) flattenAt(splat.splat.position, of_point);
-          splat.border_code = meshBorderCode(of_point, splat.splat, kNextOfPoints);
-          take(splat, values);
-          ++made;
-        }
-        splats += made;
-        degenerate += flat;
-      });
+  parallelFor(tbb::blocked_range<uint64_t>(range.first, range.end, 1024),
+              [&](const tbb::blocked_range<uint64_t>& part) {
+                const TraceScope trace("splats of points");
+                NodeSplat splat;
+                std::vector<SplatScalar> values(fields_);
+                std::vector<OuterPlane> of_point;
+                uint64_t made = 0, flat = 0;
+                for (uint64_t point = part.begin(); point < part.end(); ++point) {
+                  const double* const sums = sums_->sums(point);
+                  if (std::isnan(sums[0])) continue;
+                  const std::span<const double> moments(sums + 3, stride);
+                  if (!(moments[0] > 0)) ++flat;
+                  splatOfPoint(point, {{sums[0], sums[1], sums[2]}, {sums_->values(point), fields_}, moments},
+                               splat, values);
+                  splat.border_code = meshBorderCode(planes.of(point, of_point), splat.splat, kNextOfPoints);
+                  take(splat, values);
+                  ++made;
+                }
+                splats += made;
+                degenerate += flat;
+              });
   counts.splats += splats;
   counts.degenerate += degenerate;
 }

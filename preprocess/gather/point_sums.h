@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "preprocess/gather/corner_gather.h"
-#include "preprocess/gather/flattened_cells.h"
 #include "preprocess/gather/outer_planes.h"
 #include "preprocess/gather/point_pages.h"
 #include "preprocess/moments/mesh_splats.h"
@@ -26,7 +25,7 @@ class PointSums {
   /// `points`: how many points there are; their numbers are less. `cells`: about how many cells will be
   /// added. `fields`: how many scalars the points have.
   PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
-            const ScratchFiles& scratch, CellSpace space = CellSpace::kFlat);
+            const ScratchFiles& scratch);
   ~PointSums();
 
   /// How a pass shares its memory.
@@ -66,14 +65,12 @@ class PointSums {
 
   const uint64_t points_;
   const size_t fields_;
-  const CellSpace space_;
   const Shares shares_;
   const ScratchFiles scratch_;
   std::unique_ptr<SumPages> sums_;
   std::unique_ptr<class StreamsFile> waiting_;  // cells by ranges of points; null: there are none
   std::unique_ptr<PointBorders> borders_;
   std::vector<double> moments_;
-  FlattenedCells measured_;
 };
 
 }  // namespace curvisplat

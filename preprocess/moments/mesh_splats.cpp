@@ -79,12 +79,9 @@ void splatOfPoint(uint64_t node, const DualCell& dual, NodeSplat& splat, std::sp
   const double share = solid ? 1 / m[0] : 0.0;
   const glm::dvec3 mean(share * m[1], share * m[2], share * m[3]);
   const auto shape = [&](size_t sum, int i, int j) { return 12 * (share * m[sum] - mean[i] * mean[j]); };
-  const glm::dvec3 centre = dual.frame.bent(dual.point + mean);
-  const bool turns = !dual.frame.isFlat();
-  const glm::dmat3 turn = turns ? dual.frame.turnTo(SphereFrame(centre)) : glm::dmat3(1.0);
-  const Symmetric3 of_piece{shape(4, 0, 0), shape(5, 0, 1), shape(6, 1, 1),
-                            shape(7, 0, 2), shape(8, 1, 2), shape(9, 2, 2)};
-  setBody(node, centre, m[0], turns ? turned(of_piece, turn) : of_piece, splat);
+  setBody(node, dual.point + mean, m[0],
+          {shape(4, 0, 0), shape(5, 0, 1), shape(6, 1, 1), shape(7, 0, 2), shape(8, 1, 2), shape(9, 2, 2)},
+          splat);
   splat.node_position = dual.point;
   for (size_t field = 0; field < values.size(); ++field) {
     const double* of_field = m.data() + 10 + 5 * field;
@@ -92,7 +89,7 @@ void splatOfPoint(uint64_t node, const DualCell& dual, NodeSplat& splat, std::sp
     const glm::dvec3 h = 12.0 * (share * glm::dvec3(of_field[1], of_field[2], of_field[3]) - g * mean);
     const double variance = std::max(0.0, share * of_field[4] - g * g);
     // A slope never explains more than the variance there is; rounding, or a floored axis, may say so.
-    glm::dvec3 slope = inFrameOf(splat.splat, turns ? turn * h : h);
+    glm::dvec3 slope = inFrameOf(splat.splat, h);
     const double explained = glm::dot(slope, slope) / 12;
     if (explained > variance) slope *= std::sqrt(variance / explained);
     values[field] = {dual.values[field] + g, slope, 0.0};
@@ -134,20 +131,6 @@ void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, 
       out[field] += glm::dot(direction, right) / a[n][n] * direction;
     }
   }
-}
-
-CellBody inSpace(const CellBody& body, const SphereFrame& frame) {
-  CellBody out = body;
-  out.centre = frame.bent(body.centre);
-  const Symmetric3 shape =
-      turned({body.xx, body.xy, body.yy, body.xz, body.yz, body.zz}, frame.turnTo(SphereFrame(out.centre)));
-  out.xx = shape.xx;
-  out.xy = shape.xy;
-  out.yy = shape.yy;
-  out.xz = shape.xz;
-  out.yz = shape.yz;
-  out.zz = shape.zz;
-  return out;
 }
 
 void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own,

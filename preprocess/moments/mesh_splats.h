@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "preprocess/moments/cell_moments.h"
-#include "preprocess/moments/sphere_frame.h"
 #include "preprocess/splats/node_splats.h"
 #include "stream/model/splats.h"
 
@@ -22,7 +21,6 @@ struct DualCell {
   glm::dvec3 point{0.0};
   std::span<const float> values;  // [field]
   std::span<const double> moments;
-  SphereFrame frame = {};  // of the point, if the moments are in it
 };
 
 /// The splat of a dual cell with volume; `node`: its number. Values are [field].
@@ -38,9 +36,6 @@ struct CellNeighbours {
 /// The gradients of the fields by least squares, weighted by 1 / distance², [field]. Directions in which the
 /// neighbours say nothing, at borders, have none.
 void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, std::span<glm::dvec3> out);
-
-/// The body of a cell in space, of one in the cell's frame.
-CellBody inSpace(const CellBody& body, const SphereFrame& frame);
 
 /// The splat of a cell.
 void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own,

@@ -218,8 +218,8 @@ std::string warningOfSagitta(double sagitta_km, double thickness_km) {
   if (!(thickness_km > 0 && std::isfinite(thickness_km) && 2 * sagitta_km > thickness_km)) return "";
   return fmt::format(
       "cells are flat, and their middles lie up to {:.3g} km below the sphere, {:.3g} times the thickness of "
-      "the thinnest layer: there splats of one layer cross those of others, and opaque pictures and probes "
-      "show these, too; --flat keeps layers apart",
+      "the thinnest layer: there splats of one layer lie among those of others, and values mix; --flat keeps "
+      "layers apart",
       sagitta_km, sagitta_km / thickness_km);
 }
 
