@@ -190,6 +190,9 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
 /// An isosurface keeps its own colour when the function's change; the copied command has it, and it is undone.
 TEST_F(WindowSurfaces, AnIsosurfaceHasAColourOfItsOwn) {
   openObjects({"--iso", "0.5", "--volume", "off"}, kScreen);
+  tab("View");
+  click("scalar bar");  // which shows the function's colours
+  tab("Objects");
   const Image by_function = saveAndCopy();
   click("isosurface 1 by colours");  // it keeps the colour that it has
   EXPECT_GE(difference(saveAndCopy(), by_function), 45);
