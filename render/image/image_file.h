@@ -38,7 +38,7 @@ uint64_t writingBytes(const std::filesystem::path& path, ImageSize size);
 /// Reads PNG (8 and 16 bits a channel), JPEG, scan-line EXR and PFM files. Throws Error.
 Image readImage(const std::filesystem::path& path);
 /// The size that the file's header states, which nothing else in it need bear out. Reads no more than the header. Throws Error as
-/// readImage().
+/// readImage(), and for an EXR file of more channels than a map has: decoding expands each of them.
 ImageSize readImageSize(const std::filesystem::path& path);
 
 /// An encoded image: all bytes of its file.
