@@ -68,7 +68,8 @@ class Cursor {
     return value;
   }
   std::span<const std::byte> takeBytes(size_t count) {
-    if (count > bytes_.size() - at_) throw Error("{}: the EXR file is truncated", name_);
+    if (count > bytes_.size() - at_)
+      throw Error("{}: the EXR file is truncated{}", name_, limitOfHeader(bytes_));
     at_ += count;
     return bytes_.subspan(at_ - count, count);
   }
