@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "render/colour/function_blend.h"
+#include "render/project/screen_view.h"
 #include "render/surface/surface_scene.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
@@ -126,9 +127,8 @@ void takeFunction(const JsonField& field, const std::string& place, KeyLook& loo
 }
 
 glm::dvec3 scaleFrom(const JsonField& field) {
-  constexpr double kMin = 1e-6, kMax = 1e6;  // as of the option
-  const glm::dvec3 scale = field.point(kMax);
-  if (!(scale.x >= kMin && scale.y >= kMin && scale.z >= kMin))
+  const glm::dvec3 scale = field.point(kMaxScale);
+  if (!(scale.x >= kMinScale && scale.y >= kMinScale && scale.z >= kMinScale))
     field.fail("three numbers between 1e-6 and 1e6");
   return scale;
 }

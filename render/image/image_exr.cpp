@@ -68,7 +68,8 @@ class Cursor {
     return value;
   }
   std::span<const std::byte> takeBytes(size_t count) {
-    if (count > bytes_.size() - at_) throw Error("{}: the EXR file is truncated", name_);
+    if (count > bytes_.size() - at_)
+      throw Error("{}: the EXR file is truncated{}", name_, limitOfHeader(bytes_));
     at_ += count;
     return bytes_.subspan(at_ - count, count);
   }
@@ -321,6 +322,10 @@ std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, co
 ImageSize sizeOfExr(std::span<const std::byte> bytes, const std::string& name) {
   Cursor cursor(bytes, name);
   const ExrLayout layout = takeHeader(cursor, name);
+  constexpr size_t kMaxOfMap = 4;
+  if (layout.channels.size() > kMaxOfMap)
+    throw Error("{}: has {} channels; a map has at most {} (R, G, B, A)", name, layout.channels.size(),
+                kMaxOfMap);
   requirePossibleSize(layout.width(), layout.height(), name);
   return {static_cast<int>(layout.width()), static_cast<int>(layout.height())};
 }

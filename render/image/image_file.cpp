@@ -143,6 +143,11 @@ Image readImage(const std::filesystem::path& path) {
   return format.decode(firstBytes(file, file.size()), path.string());
 }
 
+std::string limitOfHeader(std::span<const std::byte> bytes) {
+  if (bytes.size() != kLongestHeader) return {};
+  return fmt::format(" (headers of at most {} bytes are read)", kLongestHeader);
+}
+
 void requirePossibleSize(int64_t width, int64_t height, const std::string& name) {
   if (width < 1 || height < 1 || width > kLargestImageSide || height > kLargestImageSide)
     throw Error("{}: claims {} x {} pixels, expected 1 to {} on each side", name, width, height,

@@ -37,8 +37,8 @@ void checkImageSize(uint64_t width, uint64_t height, const std::filesystem::path
 uint64_t writingBytes(const std::filesystem::path& path, ImageSize size);
 /// Reads PNG (8 and 16 bits a channel), JPEG, scan-line EXR and PFM files. Throws Error.
 Image readImage(const std::filesystem::path& path);
-/// The size that the file's header states, which nothing else in it need bear out. Reads no more than the header. Throws Error as
-/// readImage().
+/// The size that the file's header states, which nothing else in it need bear out. Reads at most 4 MiB. Throws
+/// Error as readImage(), and for an EXR file of more channels than a map has: decoding expands each of them.
 ImageSize readImageSize(const std::filesystem::path& path);
 
 /// An encoded image: all bytes of its file.
@@ -67,6 +67,9 @@ ImageSize sizeOfPng(std::span<const std::byte> bytes, const std::string& name);
 ImageSize sizeOfExr(std::span<const std::byte> bytes, const std::string& name);
 ImageSize sizeOfPfm(std::span<const std::byte> bytes, const std::string& name);
 ImageSize sizeOfJpeg(std::span<const std::byte> bytes, const std::string& name);
+
+/// Words for a message about a header that ends early, if it is longer than readImageSize() reads; else empty.
+std::string limitOfHeader(std::span<const std::byte> bytes);
 
 /// Throws Error unless width and height are in [1, kLargestImageSide].
 void requirePossibleSize(int64_t width, int64_t height, const std::string& name);

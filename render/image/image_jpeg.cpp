@@ -4,6 +4,8 @@
 
 #include <jpeglib.h>
 
+#include <jerror.h>  // after jpeglib.h, whose version numbers its messages
+
 #include <csetjmp>
 #include <cstring>
 #include <vector>
@@ -20,6 +22,7 @@ constexpr int kMaxScans = 200;  // of progressive files: each goes through all p
 
 struct JpegErrors : jpeg_error_mgr {
   std::jmp_buf stop;
+  bool in_header = false;
   char text[JMSG_LENGTH_MAX] = "";
 };
 
@@ -29,9 +32,11 @@ struct JpegErrors : jpeg_error_mgr {
   std::longjmp(errors->stop, 1);
 }
 
-/// Warnings are of damaged data, which would become grey pixels.
+/// Warnings are of damaged data, which would become grey pixels. Those of a header are accepted, unless it
+/// ends early: they are of revisions and transforms that libjpeg does not know.
 void onMessage(j_common_ptr jpeg, int level) {
-  if (level < 0) onError(jpeg);
+  const auto* const errors = static_cast<const JpegErrors*>(jpeg->err);
+  if (level < 0 && (!errors->in_header || errors->msg_code == JWRN_JPEG_EOF)) onError(jpeg);
 }
 
 void onProgress(j_common_ptr jpeg) {
@@ -62,7 +67,9 @@ bool readHeader(JpegReader& reader, std::span<const std::byte> bytes) {
   jpeg_create_decompress(&reader.jpeg);
   reader.jpeg.progress = &reader.progress;
   jpeg_mem_src(&reader.jpeg, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  reader.errors.in_header = true;
   jpeg_read_header(&reader.jpeg, TRUE);
+  reader.errors.in_header = false;
   return true;
 }
 
@@ -84,7 +91,7 @@ bool readPixels(JpegReader& reader, JSAMPROW row, Image& image) {
 
 ImageSize takeHeader(JpegReader& reader, std::span<const std::byte> bytes, const std::string& name) {
   if (!readHeader(reader, bytes))
-    throw Error("{}: the JPEG header cannot be read: {}", name, reader.errors.text);
+    throw Error("{}: the JPEG header cannot be read: {}{}", name, reader.errors.text, limitOfHeader(bytes));
   return {static_cast<int>(reader.jpeg.image_width), static_cast<int>(reader.jpeg.image_height)};
 }
 

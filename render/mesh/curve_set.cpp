@@ -62,8 +62,9 @@ struct SphereArc {
       : from(glm::normalize(a)), radius_from(glm::length(a)), radius_to(glm::length(b)) {
     const glm::dvec3 to = glm::normalize(b), normal = glm::cross(from, to);
     angle = std::atan2(glm::length(normal), glm::dot(from, to));
-    // Opposite places are joined by a pole, or, if they are the poles, by longitude 0.
-    constexpr double kOpposite = 1e-9, kPole = 1 - 1e-12;
+    // Opposite places are joined by a pole, or, if they are the poles, by longitude 0. Places are floats from
+    // the set's first point on, so that opposite ones are so to some 1e-7.
+    constexpr double kOpposite = 1e-6, kPole = 1 - 1e-10;
     const glm::dvec3 by = std::abs(from.z) < kPole ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
     const glm::dvec3 towards = glm::length(normal) < kOpposite ? by : to;
     across = glm::normalize(towards - glm::dot(towards, from) * from);

@@ -28,6 +28,9 @@ inline constexpr double kSlopeLowPass = 0.01;
 /// one is off by at most 2 % of the splat's size at one deviation from the centre.
 inline constexpr double kWidest = 0.4;
 
+/// Bounds of the factors by which data are scaled.
+inline constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
+
 /// A view as the projection uses it. "Stretched" space is scale * data.
 struct ScreenView {
   Projection projection = Projection::kOrthographic;

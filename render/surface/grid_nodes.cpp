@@ -26,6 +26,13 @@ struct FoundNode {
   glm::vec3 slope;
 };
 
+/// The splat of a whole cell, in place of that of a part.
+struct Whole {
+  size_t node;
+  glm::vec3 at;
+  float value;
+};
+
 /// `is_part`: the splat is a part of the node's cell, whose border code does not tell where the node is.
 FoundNode nodeOf(const SplatGeometry& g, const SplatVariable& v, size_t n, bool is_part) {
   const double a0 = g.axis0[n], a1 = g.axis1[n], a2 = g.axis2[n];
@@ -122,11 +129,13 @@ GridNodes::Bytes GridNodes::bytes(const Manifest& manifest, bool two_scalars) {
   const uint64_t shared = joined > 0 ? sizeof(uint32_t) * manifest.nodes + joined : 0;
   const uint64_t kept = manifest.nodes * sizeof(float) * (two_scalars ? 5 : 4) + joined + marks;
   uint64_t more = manifest.nodes * 3 * sizeof(float);
-  uint64_t of_plane = 0;
+  uint64_t of_plane = 0, largest = 0;
   for (const BlockInfo& block : manifest.blocks) {
     of_plane = std::max(of_plane, block.ni * block.nj);
+    largest = std::max(largest, block.ni * block.nj * block.nk);
     if (joined > 0) more += joinBytes({{block.ni, block.nj, block.nk}, 0});
   }
+  if (manifest.blanked_nodes > 0) more += 2 * sizeof(Whole) * largest;  // as their array doubles
   return {kept + more + 2 * sizeof(glm::vec3) * of_plane, kept, shared};
 }
 
@@ -292,8 +301,9 @@ void GridNodes::addLeaf(const CacheReader& cache, uint32_t brick, const SplatGeo
 }
 
 /// Moves what is left of cells beside blanked ones to where the splats of the whole cells would be: along axes with one neighbour at the
-/// node, else in the cell's middle.
+/// node, else in the cell's middle. All are found before any is moved, so that their order does not matter.
 void GridNodes::completeParts(const Block& block) {
+  std::vector<Whole> found;
   forNodes(block, [&](size_t node, const OfAxes& axes) {
     const auto middle = middleOfPart(block, node);
     if (!middle) return;
@@ -313,11 +323,15 @@ void GridNodes::completeParts(const Block& block) {
     whole /= of_node;
     const double value =
         value_[node] + glm::dot(glm::dvec3(slopes_.x[node], slopes_.y[node], slopes_.z[node]), whole - at);
-    x_[node] = static_cast<float>(whole.x);
-    y_[node] = static_cast<float>(whole.y);
-    z_[node] = static_cast<float>(whole.z);
-    if (std::isfinite(value)) value_[node] = static_cast<float>(value);
+    found.push_back(
+        {node, glm::vec3(whole), std::isfinite(value) ? static_cast<float>(value) : value_[node]});
   });
+  for (const Whole& whole : found) {
+    x_[whole.node] = whole.at.x;
+    y_[whole.node] = whole.at.y;
+    z_[whole.node] = whole.at.z;
+    value_[whole.node] = whole.value;
+  }
 }
 
 /// Moves positions from the middles of cells to the nodes, and values with them; adds what bent coordinates have taken from means.

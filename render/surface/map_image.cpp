@@ -106,7 +106,8 @@ glm::vec3 PlacedMap::at(const glm::dvec3& point, double pixel) const {
 }
 
 MapImage readMapImage(const std::filesystem::path& path) {
-  // By the header first: decoded, an image takes up to 24 bytes a pixel, however short its file is.
+  // The header comes first: decoded, an image takes up to 24 bytes a pixel, an EXR file up to 48, however
+  // short it is.
   const ImageSize size = readImageSize(path);
   requireMapSize(size, path.string());
   const uint64_t bytes = InputFile(path).size(), most = kMaxPixelBytes * size.pixels() + kMaxOtherBytes;

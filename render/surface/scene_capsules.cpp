@@ -39,8 +39,9 @@ Capsule guarded(const Capsule& capsule, float guard) {
   return {at(from), at(to)};
 }
 
-/// Chooses the points of lines that a picture tells apart: a chord between two of them passes all points between by no more
-/// than `straightest` pixels, and their values by 1/256 of the range of all.
+/// Chooses the points of lines that a picture tells apart: a chord between two of them passes all points between
+/// that are half a pixel or more from its beginning by no more than `straightest` pixels, and their values by
+/// 1/256 of the range of all.
 ///
 /// The first step from a point that was chosen gives a direction. Each point then leaves a disc of slopes beside it in which the
 /// chord has to be, and an interval of what values may change along it; the chooser keeps a disc within all of them.

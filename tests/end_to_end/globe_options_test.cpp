@@ -319,6 +319,12 @@ TEST_F(GlobeOptions, TheEarthHidesWhatIsBehindIt) {
   overwriteFile(file("large.exr"), exr);
   refused("sea", {"--map", file("large.exr")}, 1,
           "large.exr: has 30000 x 15000 pixels, more than the 67108864 of a map");
+  // TinyEXR makes floats of all channels, however short the file is.
+  std::vector<ImageChannel> channels;
+  for (const char* name : {"P", "Q"}) channels.push_back({name, {0, 0}});
+  writeExr(Image({2, 1}), channels, file("channels.exr"));
+  refused("sea", {"--map", file("channels.exr")}, 1,
+          "channels.exr: has 6 channels; a map has at most 4 (R, G, B, A)");
   overwriteFile(file("large.pfm"), "PF\n30000 15000\n-1\n");
   refused("sea", {"--map", file("large.pfm")}, 1,
           "large.pfm: has 30000 x 15000 pixels, more than the 67108864 of a map");

@@ -329,6 +329,24 @@ TEST(Jpeg, RefusesEveryTruncatedPrefixAndSurvivesFlippedBits) {
   }
 }
 
+/// Programs write other numbers into headers than libjpeg knows.
+TEST(Jpeg, ReadsUnknownRevisionsAndTransforms) {
+  const Bytes bytes = jpegOf(slopes({21, 18}), false);
+  const std::vector<float> expected = decodeJpeg(bytes, "a.jpg").rgba;
+  Bytes revision = bytes;
+  revision.at(11) = std::byte{2};  // the major one of JFIF
+  EXPECT_EQ(decodeJpeg(revision, "a.jpg").rgba, expected);
+  // A marker of Adobe in place of that of JFIF, with the transform 9.
+  const std::string adobe(
+      "\xff\xee\0\x0e"
+      "Adobe\0\x64\0\0\0\0\x09",
+      16);
+  Bytes transform = prefixOf(bytes, 2);
+  for (const char letter : adobe) transform.push_back(static_cast<std::byte>(letter));
+  transform.insert(transform.end(), bytes.begin() + 20, bytes.end());
+  EXPECT_EQ(decodeJpeg(transform, "a.jpg").rgba, expected);
+}
+
 /// A scan of a few bytes goes through all pixels: a short file would take hours.
 TEST(Jpeg, RefusesTooManyScans) {
   const auto scansOf = [](int bits) {  // each coefficient in a scan of its own, and each of its last bits
@@ -363,6 +381,14 @@ TEST(ImageFiles, HaveTheirSizeInTheHeader) {
   writeFileAtomically(folder / "a.jpg", std::string(reinterpret_cast<const char*>(jpeg.data()), jpeg.size()));
   EXPECT_EQ(readImage(folder / "a.jpg").size, image.size);
   EXPECT_EQ(readImageSize(folder / "a.jpg"), image.size);
+  // Comments of 5 MB come before the size.
+  std::string commented("\xff\xd8", 2);
+  for (int n = 0; n < 80; ++n) commented += std::string("\xff\xfe\xff\xff", 4) + std::string(65533, ' ');
+  commented.append(reinterpret_cast<const char*>(jpeg.data()) + 2, jpeg.size() - 2);
+  writeFileAtomically(folder / "a.jpg", commented);
+  expectError([&] { readImageSize(folder / "a.jpg"); },
+              {"the JPEG header cannot be read: ", " (headers of at most 4194304 bytes are read)"});
+  EXPECT_EQ(readImage(folder / "a.jpg").size, image.size);
   writeFileAtomically(folder / "a.pfm", std::string("PF\n70000 1\n-1\n"));
   EXPECT_THROW(readImageSize(folder / "a.pfm"), Error);
 }

@@ -167,6 +167,39 @@ TEST_F(IsoMeshesTest, NodesBesideBlankedOnesAreFoundAgain) {
   EXPECT_LT(off_value.back(), 0.1);
 }
 
+TEST_F(IsoMeshesTest, NodesBesideBlankedOnesAreTheSameInAnyOrder) {
+  const auto reversed = [](const GridNode& n) {
+    return GridNode{0, kNodes[0] - 1 - n.i, kNodes[1] - 1 - n.j, kNodes[2] - 1 - n.k};
+  };
+  const auto valuesOf = [](const GridNode& n) {
+    const double value = std::sin(0.2 * double(n.i)) + std::cos(0.15 * double(n.j)) + 0.02 * double(n.k);
+    return NodeValues{bentPlace(n), {static_cast<float>(value)}, isLand(n)};
+  };
+  const CacheReader cache = converted(valuesOf);
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
+  const CacheReader backwards = converted([&](const GridNode& n) { return valuesOf(reversed(n)); });
+  const GridNodes others(backwards, 0, std::nullopt, false, kNeverStopped);
+  ASSERT_TRUE(nodes.areComplete());
+  ASSERT_TRUE(others.areComplete());
+  double off_value = 0, off_place = 0;
+  size_t node = 0;
+  for (uint64_t k = 0; k < kNodes[2]; ++k)
+    for (uint64_t j = 0; j < kNodes[1]; ++j)
+      for (uint64_t i = 0; i < kNodes[0]; ++i, ++node) {
+        const size_t other = nodes.size() - 1 - node;
+        ASSERT_EQ(nodes.isBlank(node), others.isBlank(other));
+        if (nodes.isBlank(node)) continue;
+        const double cell = glm::length(bentPlace({0, i + 1, j, k}) - bentPlace({0, i, j, k}));
+        const glm::dvec3 at = nodes.origin() + glm::dvec3(nodes.position(node));
+        const glm::dvec3 there = others.origin() + glm::dvec3(others.position(other));
+        off_place = std::max(off_place, glm::length(there - at) / cell);
+        off_value = std::max(off_value, std::abs(double{others.value(other)} - double{nodes.value(node)}));
+      }
+  fmt::print("places {}, values {}\n", off_place, off_value);
+  EXPECT_LT(off_place, 0.01);
+  EXPECT_LT(off_value, 0.01);
+}
+
 TEST_F(IsoMeshesTest, PeaksAtAllPlacesAreClosed) {
   // Every fourth node, so that peaks lie at all places of the bricks; seen from a corner of eight bricks, too.
   for (const uint64_t shift : {0, 1}) {

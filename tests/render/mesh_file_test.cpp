@@ -1,6 +1,7 @@
 // Surfaces from files: what is read, and what is refused.
 #include "render/mesh/triangle_mesh.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -278,6 +279,22 @@ TEST(CurveText, LongSegmentsFollowTheSphere) {
   globe.shape = Globe::Shape::kFlat;
   EXPECT_FALSE(parseCurveText("lon,lat\n0,0\n90,0\n", "a.csv", "", globe).on_sphere);
   EXPECT_FALSE(curves("x,y,z\n0,0,9\n90,0,9\n").on_sphere);
+}
+
+/// Places count from the set's first one, in single precision.
+TEST(CurveText, OppositePlacesAreJoinedByAPoleOrLongitude0) {
+  for (const char* first : {"0,-60", "12,30"}) {
+    const auto middleOf = [&](const std::string& ends) {
+      const CurveSet set =
+          alongSphere(parseCurveText(fmt::format("lon,lat\n{}\n\n{}\n", first, ends), "a.csv", "", Globe{}));
+      const size_t begin = set.begins.at(1), end = set.begins.at(2);
+      EXPECT_GT(end - begin, 100u);
+      return glm::normalize(pointOf(set, begin + (end - 1 - begin) / 2));
+    };
+    EXPECT_NEAR(glm::distance(middleOf("30,0\n-150,0"), glm::dvec3(0, 0, 1)), 0, 1e-6) << first;
+    EXPECT_NEAR(glm::distance(middleOf("0,90\n0,-90"), glm::dvec3(1, 0, 0)), 0, 1e-6) << first;
+    EXPECT_NEAR(glm::distance(middleOf("50,-90\n-70,90"), glm::dvec3(1, 0, 0)), 0, 1e-6) << first;
+  }
 }
 
 /// A file may take little more memory, whatever its lines.

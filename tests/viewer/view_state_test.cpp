@@ -162,6 +162,8 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/light_strength", 2, "light_strength");
   expectError("/light_direction", nlohmann::json::array({0, 0, 0}), "light_direction");
   expectError("/scale", nlohmann::json::array({1, 1, 0}), "scale");
+  expectError("/scale", nlohmann::json::array({1, 1e-7, 1}), "scale");
+  expectError("/scale", nlohmann::json::array({1e7, 1, 1}), "scale");
   expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
   expectError("/clip_planes", 3, "clip_planes");
   expectError("/slices/0/normal", nlohmann::json::array({0, 0, 0}), "slices[0].normal");

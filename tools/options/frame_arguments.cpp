@@ -9,6 +9,7 @@
 
 #include "render/colour/function_parts.h"
 #include "render/project/light.h"
+#include "render/project/screen_view.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"

@@ -14,8 +14,6 @@
 
 namespace curvisplat {
 
-inline constexpr double kMinScale = 1e-6, kMaxScale = 1e6;  // factors of the data
-
 /// Command-line arguments as given; checked and parsed by frameOptions().
 struct FrameArguments {
   std::string size = "600x600", background = "dark";

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/project/screen_view.h"
 #include "stream/base/error.h"
-#include "tools/options/frame_arguments.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {

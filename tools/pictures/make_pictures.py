@@ -111,6 +111,7 @@ def main():
     parser.add_argument("--only", default="", help="names of the pictures to draw (default: all)")
     arguments = parser.parse_args()
     program = arguments.program.resolve()
+    arguments.data = arguments.data.resolve()
     chosen = [name for name in re.split(",", arguments.only) if name] or [*PICTURES, "window"]
 
     with tempfile.TemporaryDirectory() as name:

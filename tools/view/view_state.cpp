@@ -13,6 +13,7 @@
 #include "render/camera/camera_path.h"
 #include "render/colour/function_parts.h"
 #include "render/mesh/triangle_mesh.h"
+#include "render/project/screen_view.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
 #include "tools/view/stated_function.h"
@@ -529,8 +530,9 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
     version.fail("1, the only version this program reads");
   const JsonField variable = fields.at("variable"), scale = fields.at("scale");
   if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
-  const glm::dvec3 factors = scale.point();
-  if (!(std::min({factors.x, factors.y, factors.z}) > 0)) scale.fail("three numbers above zero");
+  const glm::dvec3 factors = scale.point(kMaxScale);
+  if (!(std::min({factors.x, factors.y, factors.z}) >= kMinScale))
+    scale.fail("three numbers between 1e-6 and 1e6");
 
   ViewState state{variable.text(), cameraFrom(fields.at("camera")),
                   functionFrom(fields, path, defaultOpacityUnit(manifest, factors))};
