@@ -111,7 +111,9 @@ struct TileLists::Sorter {
   hwy::Sorter sort;
 };
 
-TileLists::TileLists() : sorter_(std::make_unique<Sorter>()) {}
+TileLists::TileLists() : sorter_(std::make_unique<Sorter>()) {
+  makeSpace();
+}
 
 TileLists::~TileLists() = default;
 
@@ -148,7 +150,8 @@ void TileLists::makeSpace() {
   // No list has more items than there are splats; the place behind its last is written as well.
   auto items = std::make_unique_for_overwrite<uint64_t[]>(kOrderTiles * (more + kLine));
   for (size_t tile = 0; tile < kOrderTiles; ++tile)
-    std::copy_n(&items_[tile * (before + kLine)], counts_[tile], &items[tile * (more + kLine)]);
+    if (before > 0)
+      std::copy_n(items_.get() + tile * (before + kLine), counts_[tile], items.get() + tile * (more + kLine));
   items_ = std::move(items);
   capacity_ = more;
 }

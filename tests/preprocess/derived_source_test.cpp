@@ -287,6 +287,34 @@ TEST(DerivedSource, GradientsAtPolesIgnoreWhatRoundingSetsApart) {
   }
 }
 
+TEST(DerivedSource, GradientsAtWallsAreThoseOfThinLayersFarFromTheOrigin) {
+  // Plates in single precision, whose first cells are thinner than four roundings of the largest coordinate.
+  struct Plate {
+    double length, wall, first, shear;
+  };
+  constexpr uint64_t kAlong = 26, kWide = 5, kUp = 9;
+  for (const auto& [length, wall, first, shear] : {Plate{2500, 150, 1e-3, 1}, Plate{2, 0, 4e-7, 100}}) {
+    auto grid = std::make_unique<NamedGrid>(
+        std::vector{gridBlock(kAlong, kWide, kUp)},
+        std::vector<std::string>{"Density", "Pressure", "VelocityX", "VelocityY", "VelocityZ"},
+        [length = length, wall = wall, first = first, shear = shear](const GridNode& node) {
+          const double along = length * static_cast<double>(node.i) / (kAlong - 1),
+                       across = 0.01 * length * static_cast<double>(node.j);
+          const glm::dvec3 x(glm::vec3(
+              glm::dvec3(along, across, wall + first * (std::exp2(static_cast<double>(node.k)) - 1))));
+          const auto u = static_cast<float>(shear * (x.z - static_cast<float>(wall)));
+          return NodeValues{x, {1, u, u, 0, 0}, false};
+        });
+    grid->roundCoordinates();
+    const DerivedSource source(std::move(grid), options());
+    const Values values = valuesOf(source, {"vorticity_magnitude", "pressure_gradient_magnitude"});
+    for (size_t n = 0; n < kAlong * kWide * kUp; ++n) {
+      EXPECT_NEAR(values("vorticity_magnitude", n) / shear, 1, 1e-4) << length << ": " << n;
+      EXPECT_NEAR(values("pressure_gradient_magnitude", n) / shear, 1, 1e-4) << length << ": " << n;
+    }
+  }
+}
+
 TEST(DerivedSource, VolumesOfStretchedAndTwistedCellsAreExact) {
   // Nodes are stretched along i by a factor of 3 a step, and turned from plane to plane. Node (2, 2, 1) is blanked.
   const auto place = [](double i, double j, double k) {

@@ -300,6 +300,16 @@ TEST(TileLists, LeaveOutOrderTilesOfWhichAFaceTakesAllPixels) {
   EXPECT_GT(taken_tiles, 100u);
 }
 
+TEST(TileLists, OfNoSplatAreEmpty) {
+  TileLists lists;
+  for (int tile = 0; tile < 2; ++tile) {
+    lists.begin({0, 0});
+    lists.end();
+    EXPECT_TRUE(lists.order().empty());
+    for (const OrderList& list : lists.lists()) EXPECT_TRUE(list.empty());
+  }
+}
+
 /// Lists of few and of many splats, which come in the order of their keys, nearly so, or in none.
 TEST(TileLists, SortEachListByKeysAndThenByOrder) {
   TileLists lists;

@@ -267,24 +267,37 @@ std::pair<size_t, size_t> FlowWindow::neighbours(size_t n, int axis, uint64_t in
   return {before ? n - stride : n, after ? n + stride : n};
 }
 
-glm::dvec3 FlowWindow::stepBetween(size_t before, size_t after) const {
+glm::dmat3 FlowWindow::stepsBetween(const EndsOfAxes& ends) const {
   constexpr double kRoundings = 4;
+  constexpr double kAxisFloor = 1e-6;  // of the longest step: thin layers are thicker, poles are not
   const double digit = source_.description().coordinate_bytes == 4 ? std::numeric_limits<float>::epsilon()
                                                                    : std::numeric_limits<double>::epsilon();
-  const glm::dvec3 here = position(before), step = position(after) - here, size = glm::abs(here);
-  const double most = std::max({size.x, size.y, size.z});
-  return glm::length(step) > kRoundings * digit * most ? step : glm::dvec3(0.0);
+  glm::dmat3 steps;
+  std::array<double, 3> lengths{}, roundings{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const glm::dvec3 from = position(ends[axis].first), to = position(ends[axis].second);
+    const glm::dvec3 size = glm::max(glm::abs(from), glm::abs(to));
+    steps[static_cast<int>(axis)] = to - from;
+    lengths[axis] = glm::length(to - from);
+    roundings[axis] = kRoundings * digit * std::max({size.x, size.y, size.z});
+  }
+  const double longest = std::max({lengths[0], lengths[1], lengths[2]});
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (lengths[axis] <= std::min(roundings[axis], kAxisFloor * longest))
+      steps[static_cast<int>(axis)] = glm::dvec3(0.0);
+  return steps;
 }
 
 glm::dmat3 FlowWindow::velocityGradient(size_t n, const std::array<uint64_t, 3>& index) const {
-  glm::dmat3 steps, differences;  // columns: along the axes
+  EndsOfAxes ends;
+  glm::dmat3 differences;  // columns: along the axes
   for (int axis = 0; axis < 3; ++axis) {
     const auto [before, after] = neighbours(
         n, axis, index[axis], [&](size_t at) { return present_[at] && isFinite(flow_[at].velocity); });
-    steps[axis] = stepBetween(before, after);
+    ends[static_cast<size_t>(axis)] = {before, after};
     differences[axis] = flow_[after].velocity - flow_[before].velocity;
   }
-  const LatticeGradient gradient(steps);
+  const LatticeGradient gradient(stepsBetween(ends));
   glm::dmat3 of_components;
   for (int c = 0; c < 3; ++c)
     of_components[c] = gradient({differences[0][c], differences[1][c], differences[2][c]});
@@ -292,15 +305,15 @@ glm::dmat3 FlowWindow::velocityGradient(size_t n, const std::array<uint64_t, 3>&
 }
 
 glm::dvec3 FlowWindow::pressureGradient(size_t n, const std::array<uint64_t, 3>& index) const {
-  glm::dmat3 steps;
+  EndsOfAxes ends;
   glm::dvec3 differences;
   for (int axis = 0; axis < 3; ++axis) {
     const auto [before, after] = neighbours(
         n, axis, index[axis], [&](size_t at) { return present_[at] && std::isfinite(flow_[at].pressure); });
-    steps[axis] = stepBetween(before, after);
+    ends[static_cast<size_t>(axis)] = {before, after};
     differences[axis] = flow_[after].pressure - flow_[before].pressure;
   }
-  return LatticeGradient(steps)(differences);
+  return LatticeGradient(stepsBetween(ends))(differences);
 }
 
 /// The determinant of the Jacobian of a full-size cell around the node, also at the ends of a block.

@@ -104,9 +104,12 @@ class FlowWindow {
   void moveToCentres();
   template <typename Has>
   std::pair<size_t, size_t> neighbours(size_t n, int axis, uint64_t index, const Has& has) const;
-  /// The step from one sample to another one; none where rounding alone sets them apart, as the nodes of a pole: their values
-  /// say nothing of a gradient then.
-  glm::dvec3 stepBetween(size_t before, size_t after) const;
+  /// [axis] the samples between which a difference along it is taken.
+  using EndsOfAxes = std::array<std::pair<size_t, size_t>, 3>;
+  /// Returns the steps between the ends, as columns. One is zero where rounding alone sets its ends apart, as
+  /// the nodes of a pole: their values say nothing of a gradient then. Steps through thin layers may be as short
+  /// as the rounding of a large coordinate, but are no shorter than a millionth of the longest.
+  glm::dmat3 stepsBetween(const EndsOfAxes& ends) const;
   glm::dmat3 velocityGradient(size_t n, const std::array<uint64_t, 3>& index) const;
   glm::dvec3 pressureGradient(size_t n, const std::array<uint64_t, 3>& index) const;
   double determinant(size_t n, const std::array<uint64_t, 3>& index) const;
