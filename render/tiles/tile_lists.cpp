@@ -111,9 +111,7 @@ struct TileLists::Sorter {
   hwy::Sorter sort;
 };
 
-TileLists::TileLists() : sorter_(std::make_unique<Sorter>()) {
-  makeSpace();
-}
+TileLists::TileLists() : sorter_(std::make_unique<Sorter>()) {}
 
 TileLists::~TileLists() = default;
 
@@ -121,13 +119,16 @@ void TileLists::begin(const TileCorner& tile) {
   tile_ = tile;
   order_.clear();
   counts_.fill(0);
+  staged_count_ = 0;
 }
 
 OrderTileMask TileLists::add(const ScreenSplat& splat, uint32_t number, OrderTileMask tiles, uint32_t front) {
   constexpr float kHalf = 0.5f * kOrderSide;
-  if (order_.size() == capacity_) makeSpace();
+  if (staged_.size() < staged_count_ + kOrderTiles) staged_.resize(2 * staged_.size() + kOrderTiles);
   const uint64_t index = order_.size();
-  OrderTileMask behind = 0, before = 0;
+  uint64_t* const begin = &staged_[staged_count_];
+  uint64_t* end = begin;
+  OrderTileMask behind = 0;
   for (; tiles != 0; tiles &= tiles - 1) {
     const auto tile = static_cast<uint32_t>(std::countr_zero(tiles));
     const uint32_t key =
@@ -135,25 +136,31 @@ OrderTileMask TileLists::add(const ScreenSplat& splat, uint32_t number, OrderTil
               tile_.y + static_cast<float>(tile / kOrderTilesAlong * kOrderSide) + kHalf);
     const bool is_behind = key > front;
     behind |= OrderTileMask{is_behind} << tile;
-    before |= OrderTileMask{!is_behind} << tile;
-    items_[placeOf(tile) + counts_[tile]] = uint64_t{key} << kItemNumberBits | index;
+    *end = (uint64_t{tile} << kItemKeyBits | key) << kItemNumberBits | index;
+    end += !is_behind;
     counts_[tile] += !is_behind;
   }
-  if (before != 0) order_.push_back(number);
+  if (end != begin) order_.push_back(number);
+  staged_count_ += static_cast<size_t>(end - begin);
   return behind;
 }
 
-/// Makes space for twice as many splats.
-void TileLists::makeSpace() {
-  constexpr size_t kFirst = 1024;
-  const size_t before = capacity_, more = std::max(kFirst, 2 * before);
-  // No list has more items than there are splats; the place behind its last is written as well.
-  auto items = std::make_unique_for_overwrite<uint64_t[]>(kOrderTiles * (more + kLine));
-  for (size_t tile = 0; tile < kOrderTiles; ++tile)
-    if (before > 0)
-      std::copy_n(items_.get() + tile * (before + kLine), counts_[tile], items.get() + tile * (more + kLine));
-  items_ = std::move(items);
-  capacity_ = more;
+/// Moves the items from the order of the calls to their lists, one list behind the other.
+void TileLists::distribute() {
+  constexpr uint64_t kItem = (uint64_t{1} << (kItemKeyBits + kItemNumberBits)) - 1;
+  if (staged_count_ > capacity_) {
+    items_.reset();
+    items_ = std::make_unique_for_overwrite<uint64_t[]>(staged_count_);
+    capacity_ = staged_count_;
+  }
+  std::array<size_t, kOrderTiles> ends;
+  size_t begin = 0;
+  for (size_t tile = 0; tile < kOrderTiles; ++tile) {
+    ends[tile] = begin;
+    begin += counts_[tile];
+  }
+  for (size_t n = 0; n < staged_count_; ++n)
+    items_[ends[staged_[n] >> (kItemKeyBits + kItemNumberBits)]++] = staged_[n] & kItem;
 }
 
 /// Splats come by the first key that they have in any tile: many lists are sorted, or nearly so.
@@ -174,10 +181,13 @@ void TileLists::sort(std::span<uint64_t> list) const {
 }
 
 void TileLists::end() {
+  distribute();
+  uint64_t* begin = items_.get();
   for (size_t tile = 0; tile < kOrderTiles; ++tile) {
-    const std::span<uint64_t> list(items_.get() + placeOf(tile), counts_[tile]);
+    const std::span<uint64_t> list(begin, counts_[tile]);
     sort(list);
     lists_[tile] = list;
+    begin += counts_[tile];
   }
 }
 

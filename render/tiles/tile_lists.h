@@ -35,11 +35,11 @@ OrderTileMask orderTilesOf(const TileCorner& tile, const ScreenSplat& splat);
 OrderTileMask tilesLeftOf(const TileCorner& tile, const ScreenSplat& splat, const ScreenCut& cut,
                           OrderTileMask tiles);
 
-/// The splats of an order tile, in the order in which they are to be painted. Each is an item of two fields, from the
-/// top bit: the splat's key there, its index in TileLists::order() (26 bits).
+/// The splats of an order tile, in the order in which they are to be painted. Each is an item of two fields,
+/// from the top bit: the splat's key there (32 bits), its index in TileLists::order() (26).
 using OrderList = std::span<const uint64_t>;
 
-inline constexpr int kItemNumberBits = 26;
+inline constexpr int kItemNumberBits = 26, kItemKeyBits = 32;
 /// The index in TileLists::order() of an item of an OrderList.
 inline uint32_t numberOf(uint64_t item) {
   return item & ((1u << kItemNumberBits) - 1);
@@ -50,7 +50,8 @@ inline uint32_t keyOf(uint64_t item) {
   return static_cast<uint32_t>(item >> kItemNumberBits);
 }
 
-/// The lists of one tile at a time. Keeps its memory between calls. One thread at a time.
+/// The lists of one tile at a time. Keeps its memory between calls: 8 bytes for each item of the largest
+/// tile, and up to twice as much for items as they are added. One thread at a time.
 class TileLists {
  public:
   TileLists();
@@ -72,17 +73,17 @@ class TileLists {
  private:
   TileCorner tile_{};
   std::vector<uint32_t> order_;
-  void makeSpace();
+  void distribute();
   void sort(std::span<uint64_t> list) const;
-  /// Returns where the list of an order tile begins in items_. Lists lie a cache line further apart than a power of two, or all
-  /// would compete for the same lines of the cache.
-  size_t placeOf(size_t tile) const { return tile * (capacity_ + kLine); }
 
-  static constexpr size_t kLine = 64 / sizeof(uint64_t);
   struct Sorter;
   const std::unique_ptr<Sorter> sorter_;
-  std::unique_ptr<uint64_t[]> items_;  // of the lists
-  size_t capacity_ = 0;                // of each list
+  // The first staged_count_ are items in the order of the calls, below the numbers of their order tiles (6
+  // bits); the others are space.
+  std::vector<uint64_t> staged_;
+  size_t staged_count_ = 0;
+  std::unique_ptr<uint64_t[]> items_;  // of the lists, one behind the other
+  size_t capacity_ = 0;                // of items_
   std::array<uint32_t, kOrderTiles> counts_{};
   std::array<OrderList, kOrderTiles> lists_;
 };

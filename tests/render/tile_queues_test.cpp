@@ -310,6 +310,36 @@ TEST(TileLists, OfNoSplatAreEmpty) {
   }
 }
 
+/// Makes lists of very different lengths, and then of fewer splats: their memory is that of their items.
+TEST(TileLists, LieOneBehindTheOther) {
+  TileLists lists;
+  for (const uint32_t count : {20000u, 100u, 30000u}) {
+    lists.begin({0, 0});
+    std::array<size_t, kOrderTiles> wanted{};
+    for (uint32_t n = 0; n < count; ++n) {
+      ScreenSplat splat{};
+      splat.x = splat.y = 16;
+      splat.key = count - n;
+      const size_t tile = n % 50 == 0 ? n / 50 % kOrderTiles : 17;
+      // Those behind the front are in no list.
+      const bool is_behind = n % 7 == 0;
+      const OrderTileMask tiles = OrderTileMask{1} << tile;
+      EXPECT_EQ(lists.add(splat, n, tiles, is_behind ? splat.key - 1 : splat.key), is_behind ? tiles : 0);
+      wanted[tile] += is_behind ? 0 : 1;
+    }
+    lists.end();
+    const uint64_t* begin = lists.lists()[0].data();
+    for (size_t tile = 0; tile < kOrderTiles; ++tile) {
+      const OrderList list = lists.lists()[tile];
+      EXPECT_EQ(list.size(), wanted[tile]);
+      EXPECT_EQ(list.data(), begin);
+      EXPECT_TRUE(std::is_sorted(list.begin(), list.end()));
+      begin += list.size();
+    }
+    EXPECT_EQ(lists.order().size(), count - (count + 6) / 7);
+  }
+}
+
 /// Lists of few and of many splats, which come in the order of their keys, nearly so, or in none.
 TEST(TileLists, SortEachListByKeysAndThenByOrder) {
   TileLists lists;
