@@ -181,7 +181,7 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
   };
 
   // Slopes are along the columns of the splat's A. Axes that the cache has rounded are a step apart at the most.
-  constexpr int kAlike = 2;
+  constexpr int kAlike = 1;
   const auto isAlike = [&](const std::array<uint32_t, 3>& stored, const std::array<uint32_t, 3>& found) {
     bool alike = true;
     for (size_t axis = 0; axis < 3; ++axis)
