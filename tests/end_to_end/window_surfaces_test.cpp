@@ -197,6 +197,7 @@ TEST_F(WindowSurfaces, AnIsosurfaceHasAColourOfItsOwn) {
   click("isosurface 1 by colours");  // it keeps the colour that it has
   EXPECT_GE(difference(saveAndCopy(), by_function), 45);
   click("colour of isosurface 1");
+  save();  // the list is open for the next click
   const Place swatch = placeOf("colour of isosurface 1", 0, 1);
   click(Place{swatch.first + 30, swatch.second + 30});  // light and pale, in the square below the swatch
   press("Escape");
