@@ -160,7 +160,7 @@ TEST_F(IsoMeshesTest, NodesBesideBlankedOnesAreFoundAgain) {
              off_place.back(), off_value[off_value.size() / 2], off_value[most], off_value.back());
   // In cells, and of a range of 3; only at coasts. The worst are nodes of which an octant or two are left.
   EXPECT_LT(off_place[off_place.size() / 2], 0.01);
-  EXPECT_LT(off_place[most], 0.1);
+  EXPECT_LT(off_place[most], 0.12);
   EXPECT_LT(off_place.back(), 0.5);
   EXPECT_LT(off_value[off_value.size() / 2], 0.002);
   EXPECT_LT(off_value[most], 0.02);
@@ -196,7 +196,8 @@ TEST_F(IsoMeshesTest, NodesBesideBlankedOnesAreTheSameInAnyOrder) {
         off_value = std::max(off_value, std::abs(double{others.value(other)} - double{nodes.value(node)}));
       }
   fmt::print("places {}, values {}\n", off_place, off_value);
-  EXPECT_LT(off_place, 0.01);
+  // What is stored of a node is rounded by its distance from a corner of its brick.
+  EXPECT_LT(off_place, 0.03);
   EXPECT_LT(off_value, 0.01);
 }
 
