@@ -34,7 +34,8 @@ struct alignas(16) FourFloats {
   float of[4];
 };
 
-/// The same over a block: at its middle, and how far from that at its outermost pixels. The last is no face.
+/// Holds the faces over a block: their values at its middle, and how far these change up to its outermost pixels.
+/// The last of the four is no face.
 struct BlockFaces {
   FourFloats at, by_x, by_y, spread;
 

@@ -21,7 +21,7 @@ class TilePicture {
  public:
   explicit TilePicture(const GlFunctions& gl);
 
-  /// Begins a picture of so many windows of depth: nothing is painted, and every pixel lets everything through. Throws
+  /// Begins a picture of `windows` windows of depth. Nothing is painted yet, and all pixels are transparent. Throws
   /// Error if it is larger than OpenGL draws, and PainterFailure if there is no memory for it.
   void begin(ImageSize size, int windows);
   ImageSize size() const { return size_; }

@@ -49,8 +49,8 @@ void requireGlobe(const std::optional<Globe>& globe, const std::filesystem::path
 /// The lines with each point as a line of one.
 CurveSet pointsOf(CurveSet set);
 /// The lines of a set that is on_sphere with places between those of long segments, on the great circle, with heights, values and
-/// times that change evenly: so many that segments run below the sphere by at most 1/50,000 of its radius (127 m on the Earth), or
-/// by more where that would take four for each place and a million besides.
+/// times that change evenly. Segments then run below the sphere by at most 1/50,000 of its radius (127 m on the Earth), or
+/// by more where that bound would add more than four places for each one of the set and a million besides.
 CurveSet alongSphere(const CurveSet& set);
 /// The parts of lines with times in [from, to], ended by the places at these times.
 CurveSet partBetween(const CurveSet& set, double from, double to);

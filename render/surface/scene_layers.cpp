@@ -148,7 +148,7 @@ std::array<SampledLayers::Seen, kSamples> SampledLayers::sortedOf(const std::arr
   keys.fill(UINT64_MAX);
   for (uint32_t n = 0; n < kSamples; ++n) from[n] = n;
   for (size_t n = 0; n < count; ++n) {
-    // As the order of values, unsigned; + 0 makes one of both zeros.
+    // Keys are unsigned integers in the order of the values; adding 0 makes both zeros the same.
     const auto bits = std::bit_cast<uint32_t>(seen[n].value + 0.0f);
     const uint32_t turned = bits ^ ((bits >> 31) != 0 ? 0xffffffffu : 0x80000000u);
     keys[n] = uint64_t{turned} << 32 | seen[n].number;

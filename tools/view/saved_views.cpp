@@ -332,7 +332,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   }
   if (options.turns) words.add("--orbit", "360");
   if (state.lod_pixels != 1) words.add("--lod-pixels", number(state.lod_pixels));
-  // With less the command draws the same.
+  // The option is left out below the usual memory, where the command draws the same picture.
   if (state.memory_bytes > ViewState::kMemoryBytes)
     words.add("--memory", fmt::format("{}M", (state.memory_bytes + (1 << 20) - 1) >> 20));
   if (state.classification == Classification::kFlat) words.add("--classify", "flat");

@@ -152,7 +152,7 @@ struct ViewState {
   /// The opacity of faces as they are drawn: without a scalar there is no function.
   SheetOpacity opacityOf(const NamedFaces& named) const;
   FaceNames faceNames() const;
-  /// The same with the faces of a name tinted, listed or not: what the mouse points at in a list of them.
+  /// Returns this state with the faces of a name tinted, listed or not: those that the mouse points at in a list.
   ViewState withTinted(const std::string& faces_name) const;
   /// The factor by which heights are exaggerated: z, and on a flat map what the cache was converted with as well.
   double verticalScale(const std::optional<Globe>& globe) const;

@@ -60,7 +60,7 @@ bool dragEnds(const char* label, float& low, float& high, const DraggedEnds& end
 
 /// Names the item that Dear ImGui drew last, at which Tab stops (keyboard_focus.h).
 void nameWidget(const std::string& name);
-/// The same of one that the mouse alone can use.
+/// Names a widget that the mouse alone can use.
 void nameWithoutTab(const std::string& name);
 
 /// Names a rectangle that is not an item.
