@@ -132,7 +132,7 @@ TEST_F(SeriesFormats, NetcdfGridWithHistoryFilesOneAfterTheOther) {
   // A restart that went back: the file and its step are named.
   writeHistory(file("his_0003.nc"), {4, 3});
   expectRefused({"convert", file("grid.nc"), file("his_0001.nc"), file("his_0002.nc"), file("his_0003.nc"),
-                 "--steps", "all", "-o", file("c.splats")},
+                 "--steps", "all", "--flat", "-o", file("c.splats")},
                 1, {"step 5", "his_0003.nc, time step 1", "its time 3 is not after 4"});
   EXPECT_EQ(CacheReader(file("c.splats")).series().steps.size(), 5u);
 }
