@@ -28,11 +28,7 @@ AdditionWorkspace::AdditionWorkspace(const std::filesystem::path& cache,
 }
 
 AdditionWorkspace::~AdditionWorkspace() {
-  if (folder_) return;
-  removeAll(own_);
-  // If rank 0 has failed, it could not remove a folder in which others still wrote: the last one does.
-  std::error_code not_empty;
-  std::filesystem::remove(shared_, not_empty);
+  if (!folder_) removeFolderOfRank(own_, shared_);
 }
 
 namespace {

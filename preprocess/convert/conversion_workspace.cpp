@@ -59,8 +59,19 @@ std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Rank
   const std::filesystem::path own = shared / fmt::format("rank{}", ranks.rank());
   removeAll(own);
   makeFolder(own);
-  ranks.barrier();  // before one may fail, and remove the shared folder as empty
+  try {
+    ranks.barrier();  // before one may fail, and remove the shared folder as empty
+  } catch (...) {
+    removeFolderOfRank(own, shared);
+    throw;
+  }
   return own;
+}
+
+void removeFolderOfRank(const std::filesystem::path& own, const std::filesystem::path& shared) noexcept {
+  removeAll(own);
+  std::error_code not_empty;
+  std::filesystem::remove(shared, not_empty);
 }
 
 namespace {

@@ -66,6 +66,10 @@ std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& r
 /// all ranks have theirs. All have to call it. Throws Error if it cannot.
 std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Ranks& ranks);
 
+/// Removes this rank's folder, and the shared one if it is empty: rank 0, if it failed, could not remove a folder in which
+/// others still wrote, so the last one does.
+void removeFolderOfRank(const std::filesystem::path& own, const std::filesystem::path& shared) noexcept;
+
 /// How to treat an unfinished conversion to the same output.
 enum class Unfinished {
   kRefuse,  // it is an error, if there is something to lose
