@@ -112,11 +112,8 @@ SharedSteps::~SharedSteps() {
     ranks_.waitForFailures(std::chrono::seconds(3));
   }
   if (ranks_.isFirst()) return;
-  removeAll(partOf(ranks_.rank()));
-  scratch_.reset();
-  // If rank 0 has failed, it could not remove a folder in which others still wrote: the last one does.
-  std::error_code not_empty;
-  fs::remove(folder_, not_empty);
+  scratch_.reset();  // it may lie in the shared folder
+  removeFolderOfRank(partOf(ranks_.rank()), folder_);
 }
 
 fs::path SharedSteps::partOf(unsigned rank) const {

@@ -129,7 +129,7 @@ TEST_F(SeriesFormats, NetcdfGridWithHistoryFilesOneAfterTheOther) {
       {file("grid.nc")});
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps[3].time, 3.5);
 
-  // A restart that went back: the file and its step are named.
+  // A restart that went back: the file and its step are named. Flat, since on the sphere there is a warning, too.
   writeHistory(file("his_0003.nc"), {4, 3});
   expectRefused({"convert", file("grid.nc"), file("his_0001.nc"), file("his_0002.nc"), file("his_0003.nc"),
                  "--steps", "all", "--flat", "-o", file("c.splats")},
