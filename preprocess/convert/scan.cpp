@@ -157,14 +157,20 @@ std::vector<std::string> warningsOfValues(const GridSurvey& survey, const DataSo
 
 void checkRanges(const GridSurvey& survey, const GridDescription& description,
                  std::span<const uint32_t> scalars) {
+  std::string first;
+  std::vector<uint32_t> wide;
   for (size_t n = 0; n < scalars.size(); ++n) {
     const auto [min, max] = survey.ranges.at(n);
     if (max - min <= kLargestRange) continue;
-    throw Error(
-        "{}: its values go from {:g} to {:g}, more than {:g} apart; if one of them marks missing values, "
-        "give it to --blank; otherwise scale the values",
-        description.scalars.at(scalars[n]).name, min, max, kLargestRange);
+    wide.push_back(scalars[n]);
+    if (first.empty())
+      first = fmt::format("{}: its values go from {:g} to {:g}, more than {:g} apart",
+                          description.scalars.at(scalars[n]).name, min, max, kLargestRange);
   }
+  if (wide.empty()) return;
+  throw WideScalars(
+      first + "; if one of them marks missing values, convert with --blank VALUE; otherwise scale the values",
+      std::move(wide));
 }
 
 void countNodes(const GridSource& source, const RootCube& root, const SlabBuffers& slabs,

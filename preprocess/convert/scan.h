@@ -6,12 +6,14 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/convert/bucket_plan.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/grid_survey.h"
+#include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"
 #include "stream/model/octree.h"
@@ -29,8 +31,18 @@ GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const 
 /// Throws Error if no sample is left, or if the grid is larger or smaller than single precision can say.
 void checkExtent(const GridSurvey& survey, const GridDescription& description);
 
-/// Throws Error if the values of one of the survey's scalars lie further apart than single precision can say
-/// the square of.
+/// Values of scalars lie further apart than single precision can say the square of.
+class WideScalars final : public Error {
+ public:
+  WideScalars(const std::string& text, std::vector<uint32_t> scalars)
+      : Error(text), scalars_(std::move(scalars)) {}
+  const std::vector<uint32_t>& scalars() const { return scalars_; }  // places among the source's scalars
+
+ private:
+  std::vector<uint32_t> scalars_;
+};
+
+/// Throws WideScalars if one of the survey's scalars is too wide.
 void checkRanges(const GridSurvey& survey, const GridDescription& description,
                  std::span<const uint32_t> scalars);
 

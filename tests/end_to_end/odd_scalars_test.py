@@ -4,6 +4,7 @@
 Scalars that are too small for single precision or differ by less than it resolves, meshes that have none, and cells that are copies of those of other pieces. VTK, netCDF4
 and h5py write the files. Exit status 77 (skipped) without python3-vtk9, python3-netcdf4 and python3-h5py.
 """
+import os
 import sys
 import unittest
 
@@ -71,6 +72,24 @@ class OddScalars(MeshCase):
             self.values = np.full(60, value, "f4")
             drawn = self.run_program("render", self.write_vtk(True), "-o", self.folder / "p.png", "--size", "40x40")
             self.assertIn(text, drawn.stdout + drawn.stderr)
+
+    def test_a_scalar_of_too_wide_a_range_is_left_out_of_a_picture_of_others(self):
+        k, j, i = np.meshgrid(np.arange(4), np.arange(4), np.arange(4), indexing="ij")
+        wide = np.where(i == 1, 3e19, -3e19)
+        grid, solution = self.folder / "w.xyz", self.folder / "w.q"
+        grid.write_text("4 4 4\n" + "\n".join(str(n) for axis in (i, j, k) for n in axis.ravel()))
+        solution.write_text("4 4 4\n0 0 0 0\n" + "\n".join(str(n) for values in (i, wide, wide, j, k) for n in values.ravel()))
+        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
+        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
+        picture = ("-o", self.folder / "p.png", "--size", "40x40")
+        refused = self.run_program("render", grid, solution, "--scalar", "momentum_x", *picture)
+        reason = "momentum_x: its values go from -3e+19 to 3e+19, more than 1e+18 apart"
+        self.assertEqual((refused.returncode, refused.stderr.startswith("curvisplat: " + reason)), (1, True), refused.stderr)
+        drawn = self.run_program("render", grid, solution, "--scalar", "energy", *picture)
+        self.assertEqual(drawn.returncode, 0, drawn.stderr)
+        self.assertIn("warning: left out: momentum_x, momentum_y: " + reason, drawn.stderr)
+        refused = self.run_program("render", grid, solution, "--scalar", "momentum_y", *picture)  # which the cache lacks
+        self.assertEqual((refused.returncode, "momentum_y: its values go" in refused.stderr), (1, True), refused.stderr)
 
     def test_values_too_small_for_single_precision(self):
         warning = "c: its values are smaller than 1.2e-38 in magnitude, too small for single precision"

@@ -40,7 +40,7 @@ TEST(Toasts, TheSameTextIsOne) {
 TEST(Reports, SayWhereTheOptionsAre) {
   const std::string where =
       " (an option of \"curvisplat convert\" in a terminal; open the cache that it writes)";
-  const std::string blank = "give it to --blank; otherwise scale the values";
+  const std::string blank = "convert with --blank VALUE; otherwise scale the values";
   EXPECT_EQ(inWindowsWords(blank), blank + where);
   const std::string iblank = "read it without iblank (--iblank no)";
   EXPECT_EQ(inWindowsWords(iblank), iblank + where);

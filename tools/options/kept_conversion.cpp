@@ -15,11 +15,13 @@
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
+#include "preprocess/convert/scan.h"
 #include "preprocess/formats/open/series_files.h"
 #include "preprocess/gather/mesh_lattice.h"
 #include "preprocess/grid/grid_views.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/name_list.h"
 #include "tools/options/convert_arguments.h"
 
 namespace curvisplat {
@@ -187,6 +189,33 @@ std::vector<uint32_t> scalarsOf(const ConvertArguments& arguments, const std::ve
   }
 }
 
+/// Whether one of `wanted` is the scalar, as `info` prints it with its unit or without.
+bool isWanted(const GridScalar& scalar, const std::vector<std::string>& wanted) {
+  return std::ranges::count(wanted, scalar.name) > 0 ||
+         std::ranges::count(wanted, fmt::format("{} [{}]", scalar.name, scalar.unit)) > 0;
+}
+
+/// Converts without scalars whose range is too wide, unless they are wanted or no other is there.
+ConvertReport convertNarrow(const DataSource& source, const ConvertOptions& all,
+                            const std::vector<std::string>& wanted, Progress& progress) {
+  try {
+    return convert(source, all, progress);
+  } catch (const WideScalars& error) {
+    ConvertOptions others = all;
+    std::vector<std::string> left_out;
+    for (const uint32_t wide : error.scalars()) {
+      const GridScalar& scalar = source.description().scalars[wide];
+      if (isWanted(scalar, wanted)) throw;
+      left_out.push_back(scalar.name);
+      std::erase(others.scalars, wide);
+    }
+    if (others.scalars.empty()) throw;
+    ConvertReport report = convert(source, others, progress);
+    report.warnings.push_back(fmt::format("left out: {}: {}", listed(left_out), error.what()));
+    return report;
+  }
+}
+
 /// Makes a series beside its place, since a cache of its first steps looks complete. It is not moved when it
 /// is complete, since a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
@@ -242,7 +271,7 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   options.precision = precision;
   options.scalars = scalarsOf(arguments, scalars, source->description());
   makePreview(*source, options, false, progress, events);
-  sayAll(events, source->description(), convert(*source, options, progress));
+  sayAll(events, source->description(), convertNarrow(*source, options, scalars, progress));
 }
 
 }  // namespace curvisplat
