@@ -75,11 +75,18 @@ uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
   return asked.value_or(0);
 }
 
-std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked) {
+std::optional<std::string> timesText(const GridDescription& description) {
   const std::vector<double>& times = description.times;
-  if (asked || times.size() < 2) return std::nullopt;
-  return fmt::format("{} time steps from {} to {}; using the first: choose with --time-step 0..{}",
-                     times.size(), numberText(times.front()), numberText(times.back()), times.size() - 1);
+  if (times.size() < 2) return std::nullopt;
+  return fmt::format("{} time steps from {} to {}", times.size(), numberText(times.front()),
+                     numberText(times.back()));
+}
+
+std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked) {
+  const auto text = timesText(description);
+  if (asked || !text) return std::nullopt;
+  return fmt::format("{}; using the first: choose with --time-step 0..{}", *text,
+                     description.times.size() - 1);
 }
 
 std::optional<double> statedTime(const GridDescription& description) {

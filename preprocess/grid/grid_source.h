@@ -166,6 +166,9 @@ bool answersTo(const GridScalar& scalar, const std::string& simple);
 uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
                         std::optional<uint32_t> asked);
 
+/// "3 time steps from 0 to 2.5"; nullopt if there is a single step.
+std::optional<std::string> timesText(const GridDescription& description);
+
 /// A note for users who have not chosen between several steps: "3 time steps from 0 to 2.5; using the first:
 /// choose with --time-step 0..2". nullopt if there is a single step, or if the user chose one.
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked);

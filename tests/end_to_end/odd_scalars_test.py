@@ -73,6 +73,49 @@ class OddScalars(MeshCase):
             drawn = self.run_program("render", self.write_vtk(True), "-o", self.folder / "p.png", "--size", "40x40")
             self.assertIn(text, drawn.stdout + drawn.stderr)
 
+    def test_a_scalar_that_varies_takes_the_place_of_constants(self):
+        """Whether it is the seventeenth of the file or of the other centring."""
+        image = vtk.vtkImageData()
+        image.SetDimensions(3, 4, 5)
+        for name, values in [(f"a{n:02}", np.full(60, n, "f4")) for n in range(16)] + [("z", np.arange(60, dtype="f4"))]:
+            array = numpy_to_vtk(values, deep=True)
+            array.SetName(name)
+            image.GetPointData().AddArray(array)
+        path = self.folder / "a.vti"
+        writer = vtk.vtkXMLImageDataWriter()
+        writer.SetFileName(str(path))
+        writer.SetInputData(image)
+        writer.Write()
+        picture = [path, "-o", self.folder / "p.png", "--size", "40x40"]
+        self.assertIn("a15 are constant, so z took their place", self.run_program("render", *picture).stderr)
+        image.GetPointData().RemoveArray("z")
+        array = numpy_to_vtk(np.arange(24, dtype="f4"), deep=True)
+        array.SetName("c")
+        image.GetCellData().AddArray(array)
+        writer.Write()
+        drawn = self.run_program("render", *picture)
+        self.assertIn("a15 are constant, so c took their place", drawn.stderr)
+        self.assertIn("24 splats of c", drawn.stdout)
+
+    def test_of_steps_that_begin_uniform_the_last_is_drawn(self):
+        for first, said in ((0.0, "the last, since the first is constant,"), (1.0, "the first")):
+            with netCDF4.Dataset(self.folder / "a.nc", "w") as f:
+                for name, size in (("time", 3), ("z", 5), ("y", 4), ("x", 3)):
+                    f.createDimension(name, size)
+                    v = f.createVariable(name, "f8", (name,))
+                    v.axis, v[:] = name[0].upper(), np.arange(size)
+                f["z"].positive = "up"
+                f["time"].units = "days since 2000-01-01"
+                ramp = np.arange(60.0).reshape(5, 4, 3)
+                f.createVariable("c", "f8", ("time", "z", "y", "x"))[:] = np.stack([first * ramp, 2 * ramp, 4 * ramp])
+            picture = [self.folder / "a.nc", "-o", self.folder / "p.png", "--size", "40x40"]
+            drawn = self.run_program("render", *picture)
+            self.assertIn(f"3 time steps from 0 to 2; {said} is shown; all of them: curvisplat convert ", drawn.stderr)
+            self.assertIn(f"{self.folder}/a.nc --steps all", drawn.stderr)
+            self.assertNotIn("everywhere", drawn.stderr)
+            refused = self.run_program("render", *picture, "--step", "1")
+            self.assertIn("has one time step; `convert --steps all` makes a cache of all", refused.stderr)
+
     def test_a_scalar_of_too_wide_a_range_is_left_out_of_a_picture_of_others(self):
         k, j, i = np.meshgrid(np.arange(4), np.arange(4), np.arange(4), indexing="ij")
         wide = np.where(i == 1, 3e19, -3e19)

@@ -16,8 +16,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kMaxDefaultScalars = 16;
-
 /// Scalars that are not converted unasked, by the reason.
 struct LeftOut {
   std::vector<std::string> other_centring, same_name, beyond_limit;

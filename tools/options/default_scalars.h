@@ -1,6 +1,7 @@
 // Chooses the scalars that `convert` takes where none are named. Any thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <set>
 #include <string>
@@ -10,8 +11,11 @@
 
 namespace curvisplat {
 
-/// The scalars that the files store and that can share a cache, each name once and 16 at most: positions in description.scalars, in their
-/// order. They have the centring of the first one, unless quantities that flow solvers compute are there in the other alone. Beyond 16,
+/// So many scalars are converted where none are named.
+inline constexpr size_t kMaxDefaultScalars = 16;
+
+/// The scalars that the files store and that can share a cache, each name once and kMaxDefaultScalars at most: positions in description.scalars, in their
+/// order. They have the centring of the first one, unless quantities that flow solvers compute are there in the other alone. Beyond that number,
 /// components are left out before scalars, those of tensors first. Prints notes that name what is left out, and how to choose it.
 /// Those of `unusable` are not chosen.
 std::vector<uint32_t> defaultScalars(const GridDescription& description,

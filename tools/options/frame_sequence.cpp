@@ -203,9 +203,10 @@ std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const Cach
   }
   const uint64_t step = arguments.step.value_or(0);
   if (step >= series.steps.size())
-    throw UsageError(
-        "--step {}: is out of range; {} has {}", step, cache.cachePath().string(),
-        series.steps.size() == 1 ? "one time step" : fmt::format("steps 0 to {}", series.steps.size() - 1));
+    throw UsageError("--step {}: is out of range; {} has {}", step, cache.cachePath().string(),
+                     series.steps.size() == 1
+                         ? "one time step; `convert --steps all` makes a cache of all that the files have"
+                         : fmt::format("steps 0 to {}", series.steps.size() - 1));
   return {{step}};
 }
 

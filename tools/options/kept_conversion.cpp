@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <memory>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <vector>
 
@@ -19,10 +20,13 @@
 #include "preprocess/formats/open/series_files.h"
 #include "preprocess/gather/mesh_lattice.h"
 #include "preprocess/grid/grid_views.h"
+#include "render/automatic/first_choice.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/name_list.h"
+#include "stream/cache/series.h"
 #include "tools/options/convert_arguments.h"
+#include "tools/options/default_scalars.h"
 
 namespace curvisplat {
 namespace {
@@ -216,6 +220,74 @@ ConvertReport convertNarrow(const DataSource& source, const ConvertOptions& all,
   }
 }
 
+bool isConstant(const fs::path& cache) {
+  return std::ranges::all_of(readManifest(cache).variables, isNearlyConstant);
+}
+
+std::string namesIn(const GridDescription& description, const std::vector<uint32_t>& scalars) {
+  std::vector<std::string> names;
+  for (const uint32_t n : scalars) names.push_back(description.scalars[n].name);
+  return listed(names);
+}
+
+/// Stored scalars of the centring that are not among `converted`; of those of one name, the first.
+std::vector<uint32_t> othersOf(const GridDescription& description, Centring centring,
+                               const std::vector<uint32_t>& converted) {
+  std::vector<uint32_t> others;
+  std::set<std::string> names;
+  for (uint32_t n = 0; n < description.scalars.size(); ++n) {
+    const GridScalar& scalar = description.scalars[n];
+    if (!scalar.derived && scalar.centring == centring && names.insert(scalar.name).second &&
+        std::ranges::count(converted, n) == 0)
+      others.push_back(n);
+  }
+  return others;
+}
+
+/// Converts the scalars of `options`. If they are all constant and none is wanted, it converts the first others that are not instead, as
+/// many at a time as are converted unasked, and those of the other centring last.
+ConvertReport convertVarying(const DataSource& source, const ConvertOptions& options,
+                             const std::vector<std::string>& wanted, Progress& progress) {
+  const ConvertReport first = convertNarrow(source, options, wanted, progress);
+  const GridDescription& description = source.description();
+  if (!std::ranges::all_of(wanted, &std::string::empty) || options.scalars.empty() ||
+      !isConstant(options.output))
+    return first;
+  const Centring centring = description.scalars[options.scalars.front()].centring;
+  const Centring other = centring == Centring::kNode ? Centring::kCell : Centring::kNode;
+  bool is_replaced = false;
+  for (const Centring of : {centring, other}) {
+    const std::vector<uint32_t> left = othersOf(description, of, options.scalars);
+    for (size_t begin = 0; begin < left.size(); begin += kMaxDefaultScalars) {
+      ConvertOptions others = options;
+      const size_t end = std::min(left.size(), begin + kMaxDefaultScalars);
+      others.scalars.assign(left.begin() + static_cast<ptrdiff_t>(begin),
+                            left.begin() + static_cast<ptrdiff_t>(end));
+      ConvertReport report = convertNarrow(source, others, wanted, progress);
+      is_replaced = true;
+      if (isConstant(options.output)) continue;
+      report.notes.push_back(
+          fmt::format("{} {} constant, so {} took {} place", namesIn(description, options.scalars),
+                      options.scalars.size() == 1 ? "is" : "are", namesIn(description, others.scalars),
+                      options.scalars.size() == 1 ? "its" : "their"));
+      return report;
+    }
+  }
+  return is_replaced ? convertNarrow(source, options, wanted, progress) : first;
+}
+
+/// Says which of the time steps is converted, and how all of them are.
+void noteTimeSteps(const std::vector<fs::path>& files, const GridDescription& description,
+                   const KeptCacheEvents& events) {
+  const auto times = timesText(description);
+  if (!times) return;
+  std::string names;
+  for (const fs::path& file : files) names += file.string() + " ";
+  events.say(fmt::format(
+      "note: {}; {} is shown; all of them: curvisplat convert {}--steps all -o series.splats", *times,
+      description.time_step == 0 ? "the first" : "the last, since the first is constant,", names));
+}
+
 /// Makes a series beside its place, since a cache of its first steps looks complete. It is not moved when it
 /// is complete, since a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
@@ -266,12 +338,23 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   arguments.output = output;
   if (hasSeveralStepFiles(arguments.grid))
     return makeSeries(arguments, output, progress, events, scalars, precision);
-  const auto source = openSource(arguments, output);
-  ConvertOptions options = optionsFor(output, files.front().stem().string());
-  options.precision = precision;
-  options.scalars = scalarsOf(arguments, scalars, source->description());
-  makePreview(*source, options, false, progress, events);
-  sayAll(events, source->description(), convertNarrow(*source, options, scalars, progress));
+  const auto convertOpen = [&](const DataSource& source, bool previews) {
+    ConvertOptions options = optionsFor(output, files.front().stem().string());
+    options.precision = precision;
+    options.scalars = scalarsOf(arguments, scalars, source.description());
+    if (previews) makePreview(source, options, false, progress, events);
+    return convertVarying(source, options, scalars, progress);
+  };
+  std::unique_ptr<DataSource> source = openSource(arguments, output);
+  ConvertReport report = convertOpen(*source, true);
+  // Cases that begin with a uniform medium.
+  if (const size_t steps = source->description().times.size(); steps > 1 && isConstant(output)) {
+    arguments.grid.time_step = static_cast<uint32_t>(steps - 1);
+    source = openSource(arguments, output);
+    report = convertOpen(*source, false);
+  }
+  sayAll(events, source->description(), report);
+  noteTimeSteps(files, source->description(), events);
 }
 
 }  // namespace curvisplat

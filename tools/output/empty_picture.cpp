@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "render/automatic/first_choice.h"
 #include "render/image/image.h"
 
 namespace curvisplat {
@@ -189,7 +190,7 @@ std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
   if (scene.options.scene && !scene.options.scene->empty()) return {};
   const PictureContrast contrast = contrastOf(image, scene.options.background);
   const bool blank = contrast.seen < kMinSeen;
-  if (!blank && contrast.other >= kMinOther * contrast.seen) return {};
+  if (!blank && (contrast.other >= kMinOther * contrast.seen || isNearlyConstant(scene.variable))) return {};
   const std::string what =
       blank ? fmt::format("nearly blank: {:.2g} % of its pixels differ visibly from the background",
                           100 * contrast.seen)
