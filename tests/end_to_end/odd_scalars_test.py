@@ -26,6 +26,11 @@ except ModuleNotFoundError as error:
 class OddScalars(MeshCase):
     VALUES = np.linspace(0, 3.4e-105, 60)  # from a public report: concentrations before anything arrives
 
+    def setUp(self):
+        super().setUp()
+        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
+        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
+
     def write_vtk(self, binary):
         image = vtk.vtkImageData()
         image.SetDimensions(3, 4, 5)
@@ -122,8 +127,6 @@ class OddScalars(MeshCase):
         grid, solution = self.folder / "w.xyz", self.folder / "w.q"
         grid.write_text("4 4 4\n" + "\n".join(str(n) for axis in (i, j, k) for n in axis.ravel()))
         solution.write_text("4 4 4\n0 0 0 0\n" + "\n".join(str(n) for values in (i, wide, wide, j, k) for n in values.ravel()))
-        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
-        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
         picture = ("-o", self.folder / "p.png", "--size", "40x40")
         refused = self.run_program("render", grid, solution, "--scalar", "momentum_x", *picture)
         reason = "momentum_x: its values go from -3e+19 to 3e+19, more than 1e+18 apart"
