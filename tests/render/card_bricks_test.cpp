@@ -351,7 +351,7 @@ TEST_F(FailingCard, ProjectsInSlabsWhatItsBuffersDoNotHoldAtOnce) {
   writeLatticeCache(folder_ / "lattice.splats", -0.5, {0.03, 0.02, 0.01});  // four layers of bricks
   open("lattice.splats");
   FrameOptions large = options(64 * kMiB);
-  large.size = {600, 500};  // the depths in which tiles of 4 pixels may order splats are small
+  large.size = {420, 350};  // the depths in which tiles of 4 pixels may order splats are small
   for (const char* view : {"iso", "+z"}) {
     FrameStatistics whole, slabs;
     const Image wanted = renderer()->render(camera(view), large, whole);
@@ -376,7 +376,7 @@ TEST_F(FailingCard, ProjectsInSlabsWhatItsMemoryDoesNotHoldAtOnce) {
   writeLatticeCache(folder_ / "lattice.splats", -0.5, {0.03, 0.02, 0.01});
   open("lattice.splats");
   FrameOptions large = options(64 * kMiB);
-  large.size = {600, 500};
+  large.size = {420, 350};
   FrameStatistics whole, slabs;
   const auto card = renderer();
   const Image wanted = card->render(camera("+z"), large, whole);

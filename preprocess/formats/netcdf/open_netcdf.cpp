@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -38,11 +39,14 @@ class TileSource final : public FaceSource {
 
  private:
   void add(uint32_t number, std::unique_ptr<NetcdfSource> tile);
-  /// The tile of a block. Closes the files of the one before: the memory of open ones is that of one tile.
+  /// Whether the tiles are so few and small that all may be open at once.
+  bool mayStayOpen() const;
+  /// The tile of a block. Closes the files of the one before, unless all may stay open: the memory of open ones is that of one tile.
   const NetcdfSource& tileOf(uint32_t block) const;
 
   std::vector<std::unique_ptr<NetcdfSource>> tiles_;  // [block]
   GridDescription description_;
+  bool stay_open_ = false;
   mutable std::atomic<uint32_t> open_ = 0;  // the tile read last
 };
 
@@ -85,6 +89,22 @@ std::map<uint32_t, OpenGridOptions> tilesOf(const OpenGridOptions& options) {
 TileSource::TileSource(const std::map<uint32_t, OpenGridOptions>& tiles) {
   for (const auto& [number, options] : tiles)
     add(number, std::make_unique<NetcdfSource>(options, tiles_.empty() ? nullptr : tiles_.front().get()));
+  stay_open_ = mayStayOpen();
+}
+
+// The gaps between tiles are read from each tile in turn, a few nodes at a time: to open its files takes a millisecond each time.
+bool TileSource::mayStayOpen() const {
+  constexpr size_t kFiles = 16;
+  constexpr uint64_t kFileBytes = uint64_t{4} << 20;  // of all files: what HDF5 knows of them is less
+  constexpr uint64_t kNodes = uint64_t{1} << 16;  // of all tiles: half a MiB of each variable that is read
+  uint64_t bytes = 0, nodes = 0;
+  for (const std::string& file : description_.files) {
+    std::error_code is_no_file;  // a folder of Zarr
+    bytes += std::filesystem::file_size(file, is_no_file);
+    if (is_no_file) return false;
+  }
+  for (const GridBlock& block : description_.blocks) nodes += block.nodes();
+  return description_.files.size() <= kFiles && bytes <= kFileBytes && nodes <= kNodes;
 }
 
 void TileSource::add(uint32_t number, std::unique_ptr<NetcdfSource> tile) {
@@ -129,6 +149,7 @@ void TileSource::add(uint32_t number, std::unique_ptr<NetcdfSource> tile) {
 
 const NetcdfSource& TileSource::tileOf(uint32_t block) const {
   CURVISPLAT_CHECK_OP(block, <, tiles_.size());
+  if (stay_open_) return *tiles_[block];
   if (const uint32_t before = open_.exchange(block); before != block) tiles_[before]->release();
   return *tiles_[block];
 }
