@@ -44,7 +44,7 @@ class ExtinctionLattice {
   std::vector<std::pair<uint32_t, std::string>> add(const CacheReader& cache, size_t variable,
                                                     const ClassificationTable& table,
                                                     const ShadowScene& scene);
-  /// Replaces the sums by extinctions: nodes on faces have less of the volume.
+  /// Replaces the sums by extinctions, with a margin: nodes on faces have less of the volume.
   void divide();
   /// [node] the optical depth from there in the direction `towards`, stretched, of length 1, as far as `reach`
   /// or the box's end.
@@ -55,7 +55,7 @@ class ExtinctionLattice {
 
   const ShadowLattice lattice_;
   const glm::dvec3 scale_;
-  std::vector<float> extinctions_;
+  std::vector<float> extinctions_;  // [lattice_.size()], then of withMargin(lattice_)
 };
 
 /// The shares of a box along an axis that the nodes from `first` on get: each place's goes to the two nodes
@@ -181,6 +181,25 @@ std::vector<std::pair<uint32_t, std::string>> ExtinctionLattice::add(const Cache
   return damaged;
 }
 
+/// A lattice with one more node at each end of each axis, which has the value of the one at the end: a ray that ends on a
+/// face reads beyond it, with no weight or that of a rounding error.
+ShadowLattice withMargin(const ShadowLattice& lattice) {
+  ShadowLattice wider = lattice;
+  for (int& nodes : wider.nodes) nodes += 2;
+  return wider;
+}
+
+std::vector<float> valuesWithMargin(const ShadowLattice& lattice, const std::vector<float>& values) {
+  const ShadowLattice wider = withMargin(lattice);
+  std::vector<float> out(wider.size());
+  const auto inside = [&](int n, size_t axis) { return std::clamp(n - 1, 0, lattice.nodes[axis] - 1); };
+  for (int k = 0; k < wider.nodes[2]; ++k)
+    for (int j = 0; j < wider.nodes[1]; ++j)
+      for (int i = 0; i < wider.nodes[0]; ++i)
+        out[wider.index(i, j, k)] = values[lattice.index(inside(i, 0), inside(j, 1), inside(k, 2))];
+  return out;
+}
+
 void ExtinctionLattice::divide() {
   const auto& [columns, rows, layers] = lattice_.nodes;
   const auto shareOf = [](int n, int nodes) { return n == 0 || n == nodes - 1 ? 0.5 : 1.0; };
@@ -189,53 +208,101 @@ void ExtinctionLattice::divide() {
       for (int i = 0; i < columns; ++i)
         extinctions_[lattice_.index(i, j, k)] /=
             static_cast<float>(shareOf(i, columns) * shareOf(j, rows) * shareOf(k, layers));
+  extinctions_ = valuesWithMargin(lattice_, extinctions_);
 }
 
-/// The trapezoidal rule from one layer of nodes to the next, across the axis along which the ray passes most
-/// of them: within a layer values are bilinear. What is left at the end counts as the last sample.
+/// The steps of rays in one direction over a lattice, from one layer of nodes to the next, across the axis along which they
+/// pass most of them. Rays begin at nodes, so all of them are at the same place between nodes after as many steps.
+class RaySteps {
+ public:
+  /// `passed`: cells along each axis, to a unit of length; `reach`: the length of a ray.
+  RaySteps(const ShadowLattice& lattice, const glm::dvec3& passed, double reach) : nodes_(lattice.nodes) {
+    const glm::dvec3 most = glm::abs(passed);
+    const int main = most.x >= most.y && most.x >= most.z ? 0 : most.y >= most.z ? 1 : 2;
+    length_ = 1 / most[main];
+    step_ = passed * length_;
+    most_ = reach / length_;
+    u_ = static_cast<size_t>((main + 1) % 3);
+    v_ = static_cast<size_t>((main + 2) % 3);
+  }
+
+  double length() const { return length_; }  // of a step
+  size_t u() const { return u_; }            // the axes across
+  size_t v() const { return v_; }
+
+  /// How many steps a ray from a node goes, as far as its reach or the lattice's end.
+  double from(const std::array<int, 3>& node) const {
+    double steps = most_;
+    for (size_t a = 0; a < 3; ++a) {
+      const double step = step_[static_cast<int>(a)];
+      if (step > 0) steps = std::min(steps, (nodes_[a] - 1 - node[a]) / step);
+      if (step < 0) steps = std::min(steps, node[a] / -step);
+    }
+    return steps;
+  }
+
+  struct Place {
+    std::array<int, 3> node{};  // from the ray's own
+    float on_u = 0, on_v = 0;   // the part of the way to the next one along u, along v
+  };
+  Place after(int steps) const {
+    Place place;
+    const auto split = [&](size_t axis) {
+      const double moved = steps * step_[static_cast<int>(axis)], whole = std::floor(moved);
+      place.node[axis] = static_cast<int>(whole);
+      return static_cast<float>(moved - whole);
+    };
+    for (size_t a = 0; a < 3; ++a)
+      if (a != u_ && a != v_) place.node[a] = step_[static_cast<int>(a)] > 0 ? steps : -steps;
+    place.on_u = split(u_);
+    place.on_v = split(v_);
+    return place;
+  }
+
+ private:
+  std::array<int, 3> nodes_;
+  double length_ = 1, most_ = 0;
+  glm::dvec3 step_{0.0};
+  size_t u_ = 1, v_ = 2;
+};
+
+/// The trapezoidal rule: within a layer of nodes values are bilinear. What is left at the end counts as the last sample.
 std::vector<float> ExtinctionLattice::depths(const glm::dvec3& towards, double reach) const {
-  const glm::dvec3 passed = towards / (scale_ * lattice_.edge);  // cells, to a unit of length
-  const glm::dvec3 most = glm::abs(passed);
-  const int main = most.x >= most.y && most.x >= most.z ? 0 : most.y >= most.z ? 1 : 2;
-  const int u = (main + 1) % 3, v = (main + 2) % 3;
-  const auto main_axis = static_cast<size_t>(main), u_axis = static_cast<size_t>(u),
-             v_axis = static_cast<size_t>(v);
-  const double length = 1 / most[main];  // of a step
-  const glm::dvec3 step = passed * length;
-  const std::array<size_t, 3> strides{1, lattice_.index(0, 1, 0), lattice_.index(0, 0, 1)};
-  const size_t along_u = strides[u_axis], along_v = strides[v_axis];
-  const std::ptrdiff_t along = static_cast<std::ptrdiff_t>(strides[main_axis]) * (step[main] > 0 ? 1 : -1);
+  const RaySteps rays(lattice_, towards / (scale_ * lattice_.edge), reach);
+  const ShadowLattice wider = withMargin(lattice_);
+  const std::array<size_t, 3> strides{1, wider.index(0, 1, 0), wider.index(0, 0, 1)};
+  const size_t along_u = strides[rays.u()], along_v = strides[rays.v()];
+  struct Sample {
+    std::ptrdiff_t offset;
+    float on_u, on_v;
+  };
+  std::vector<Sample> samples;
+  const int most = *std::max_element(lattice_.nodes.begin(), lattice_.nodes.end());
+  for (int n = 0; n < most; ++n) {
+    const RaySteps::Place place = rays.after(n);
+    std::ptrdiff_t offset = 0;
+    for (size_t a = 0; a < 3; ++a) offset += place.node[a] * static_cast<std::ptrdiff_t>(strides[a]);
+    samples.push_back({offset, place.on_u, place.on_v});
+  }
 
   std::vector<float> out(lattice_.size());
   const auto depthFrom = [&](const std::array<int, 3>& node) {
-    double steps = reach / length;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<size_t>(axis);
-      if (step[axis] > 0) steps = std::min(steps, (lattice_.nodes[a] - 1 - node[a]) / step[axis]);
-      if (step[axis] < 0) steps = std::min(steps, node[a] / -step[axis]);
-    }
+    const double steps = rays.from(node);
     const auto whole = static_cast<int>(steps);
     const double rest = steps - whole;
-    const float own = extinctions_[lattice_.index(node[0], node[1], node[2])];
-    double sum = double{own} * (whole > 0 ? 0.5 : rest);
-    const float* layer = extinctions_.data() + static_cast<std::ptrdiff_t>(node[main_axis]) *
-                                                   static_cast<std::ptrdiff_t>(strides[main_axis]);
-    for (int n = 1; n <= whole; ++n) {
-      layer += along;
-      const auto placeOn = [&](int axis, size_t a) {
-        const double last = lattice_.nodes[a] - 1;
-        const double at = std::clamp(node[a] + n * step[axis], 0.0, last);
-        const double first = std::min(static_cast<double>(static_cast<int>(at)), last - 1);
-        return std::pair(static_cast<size_t>(first), static_cast<float>(at - first));
-      };
-      const std::pair<size_t, float> on_u = placeOn(u, u_axis), on_v = placeOn(v, v_axis);
-      const float* const corner = layer + on_u.first * along_u + on_v.first * along_v;
-      const float here = corner[0] + on_u.second * (corner[along_u] - corner[0]);
+    const float* const own = extinctions_.data() + wider.index(node[0] + 1, node[1] + 1, node[2] + 1);
+    const auto at = [&](const Sample& sample) {
+      const float* const corner = own + sample.offset;
       const float* const next = corner + along_v;
-      const float there = next[0] + on_u.second * (next[along_u] - next[0]);
-      sum += double{here + on_v.second * (there - here)} * (n < whole ? 1 : 0.5 + rest);
-    }
-    return static_cast<float>(sum * length);
+      const float here = corner[0] + sample.on_u * (corner[along_u] - corner[0]);
+      const float there = next[0] + sample.on_u * (next[along_u] - next[0]);
+      return double{here + sample.on_v * (there - here)};
+    };
+    if (whole == 0) return static_cast<float>(rays.length() * rest * double{*own});
+    double sum = 0.5 * double{*own};
+    for (int n = 1; n < whole; ++n) sum += at(samples[static_cast<size_t>(n)]);
+    sum += (0.5 + rest) * at(samples[static_cast<size_t>(whole)]);
+    return static_cast<float>(rays.length() * sum);
   };
   tbb::parallel_for(0, lattice_.nodes[2], [&](int k) {
     for (int j = 0; j < lattice_.nodes[1]; ++j)

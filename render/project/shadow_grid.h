@@ -99,9 +99,10 @@ class ShadowGrid {
  public:
   static constexpr int kMaxNodes = 81, kMinNodes = 17;  // along an axis
   /// The memory in bytes of building a grid, while pictures may still have the last one.
-  static constexpr uint64_t kBytes = uint64_t{kMaxNodes} * kMaxNodes * kMaxNodes * 4 * sizeof(float) +
-                                     uint64_t{kMaxBrickSplats} * 20 * sizeof(float) +
-                                     (12 << 20);  // what reading keeps on its thread
+  static constexpr uint64_t kBytes =
+      uint64_t{kMaxNodes} * kMaxNodes * kMaxNodes * 3 * sizeof(float) +
+      uint64_t{kMaxNodes + 2} * (kMaxNodes + 2) * (kMaxNodes + 2) * sizeof(float) +
+      uint64_t{kMaxBrickSplats} * 20 * sizeof(float) + (12 << 20);  // what reading keeps on its thread
 
   /// A key by which a grid is known again: all of the scene but its gradient, which the caller compares, as
   /// the table and the cache.

@@ -10,7 +10,9 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <glm/geometric.hpp>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,6 +23,7 @@
 #include "render/project/footprint.h"
 #include "render/project/screen_view.h"
 #include "stream/base/file.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/reference/direct_picture.h"
 #include "tests/reference/function_grid.h"
 #include "tests/reference/grid_field.h"
@@ -395,40 +398,79 @@ std::vector<double> steepnessOf(const ReferenceField& field) {
   return found;
 }
 
-TEST_F(Fidelity, GradientOpacityIsThatOfEachSplatsGradient) {
-  const auto scene = makeScene("half-annulus");
-  const SceneField field(*scene);
-  const std::vector<double> steepness = steepnessOf(field);
-  // Linear over the share of the volume that is less steep.
-  const auto factor = [&](double magnitude) {
-    const auto below = std::lower_bound(steepness.begin(), steepness.end(), magnitude) - steepness.begin();
-    const double share = static_cast<double>(below) / static_cast<double>(steepness.size());
-    return std::clamp((share - 0.3) / 0.4, 0.0, 1.0);
-  };
-  ReferenceExtras extras;
-  extras.gradient_opacity = factor;
-  const KnownFunction function = KnownFunction::of("smooth");
-  const Image reference =
-      toImage(referenceMarch(field, function.exact, halfAnnulusCamera(), kSize, stepsFor(field), extras));
-  for (const auto& [lod_pixels, least_db] : {std::pair(0.0, 67.0), {8.0, 60.0}}) {
-    FrameOptions options = knownFrame(kSize);
-    options.lod_pixels = lod_pixels;
-    const auto draw = [&](Backend backend) {
-      return drawCache(cacheOf("half-annulus"), function.table, halfAnnulusCamera(), options, nullptr,
-                       backend);
+/// Pictures that leave out the flattest 30 % of the volume and dim the next 40 %.
+class GradientOpacityFidelity : public Fidelity {
+ protected:
+  static constexpr double kHidden = 0.3, kWhole = 0.7;  // shares of the volume that is less steep
+
+  Image marched(const ReferenceLight* light) const {
+    ReferenceExtras extras;
+    extras.light = light;
+    extras.gradient_opacity = [this](double magnitude) {
+      const auto below =
+          std::lower_bound(steepness_.begin(), steepness_.end(), magnitude) - steepness_.begin();
+      const double share = static_cast<double>(below) / static_cast<double>(steepness_.size());
+      return std::clamp((share - kHidden) / (kWhole - kHidden), 0.0, 1.0);
     };
-    const double off_db = compareImages(draw(Backend::kCpu), reference).psnr_db;
-    options.gradient_opacity = {{0, 0}, {0.3, 0}, {0.7, 1}, {1, 1}};
-    const Image drawn = draw(Backend::kCpu);
-    const double on_db = compareImages(drawn, reference).psnr_db;
-    fmt::print("gradient opacity at {} pixels: {:.1f} dB, without {:.1f} dB\n", lod_pixels, on_db, off_db);
-    EXPECT_GE(on_db, least_db) << lod_pixels;
-    EXPECT_LT(off_db, 30) << lod_pixels;
-    if (on_db < least_db) leavePictures("gradient", drawn, reference);
-    if (lod_pixels > 0) {
-      EXPECT_GE(compareImages(draw(Backend::kOsmesa), drawn).psnr_db, 60);
+    return toImage(
+        referenceMarch(field_, function_.exact, halfAnnulusCamera(), kSize, stepsFor(field_), extras));
+  }
+
+  /// Every painter draws what is marched, at the finest level and a coarse one, and neither without the opacity by
+  /// gradient nor, where there is light, without that.
+  void expectMarched(const std::string& name, const std::optional<Light>& light, const Image& reference,
+                     const std::array<double, 2>& least_db) const {
+    constexpr std::array<double, 2> kLodPixels{0, 8};
+    for (size_t level = 0; level < kLodPixels.size(); ++level) {
+      FrameOptions whole = knownFrame(kSize);
+      whole.lod_pixels = kLodPixels[level];
+      whole.light = light;
+      FrameOptions options = whole;
+      options.gradient_opacity = {{0, 0}, {kHidden, 0}, {kWhole, 1}, {1, 1}};
+      FrameOptions unlit = options;
+      unlit.light = std::nullopt;
+      const Image drawn = drawnWith(options, Backend::kCpu);
+      const auto dbOf = [&](const Image& picture) { return compareImages(picture, reference).psnr_db; };
+      const double db = dbOf(drawn), whole_db = dbOf(drawnWith(whole, Backend::kCpu)),
+                   unlit_db = dbOf(drawnWith(unlit, Backend::kCpu));
+      const Image by_gl = drawnWith(options, Backend::kOsmesa);
+      const double gl_db = compareImages(by_gl, drawn).psnr_db;
+      fmt::print("{} at {} pixels: {:.1f} dB, OpenGL {:.1f} dB; without {:.1f} dB, without light {:.1f} dB\n",
+                 name, whole.lod_pixels, db, dbOf(by_gl), whole_db, unlit_db);
+      EXPECT_GE(db, least_db[level]) << name << whole.lod_pixels;
+      EXPECT_GE(dbOf(by_gl), least_db[level]) << name << whole.lod_pixels;
+      EXPECT_GE(gl_db, 60) << name << whole.lod_pixels;
+      EXPECT_LT(whole_db, 30) << name << whole.lod_pixels;
+      if (light) {
+        EXPECT_LT(unlit_db, 30) << name << whole.lod_pixels;
+      }
+      if (db < least_db[level]) leavePictures(name, drawn, reference);
     }
   }
+
+  Image drawnWith(const FrameOptions& options, Backend backend) const {
+    return drawCache(cacheOf("half-annulus"), function_.table, halfAnnulusCamera(), options, nullptr,
+                     backend);
+  }
+
+  const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
+  const SceneField field_{*annulus_};
+  const KnownFunction function_ = KnownFunction::of("smooth");
+  const std::vector<double> steepness_ = steepnessOf(field_);
+};
+
+TEST_F(GradientOpacityFidelity, IsThatOfEachSplatsGradient) {
+  expectMarched("gradient", std::nullopt, marched(nullptr), {67, 60});
+}
+
+TEST_F(GradientOpacityFidelity, IsLitByTheSameGradient) {
+  Light light;
+  light.towards = glm::dvec3(1, -1, 2);
+  ReferenceLight truth;
+  truth.towards = light.towards;
+  const CacheReader cache(cacheOf("half-annulus"));
+  truth.g0 = 1 / glm::length(cache.manifest().upper - cache.manifest().lower);  // the function's range is 1
+  expectMarched("lit gradient", light, marched(&truth), {65, 58.5});
 }
 
 }  // namespace

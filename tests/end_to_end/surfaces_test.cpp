@@ -336,6 +336,17 @@ TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
       << result.err;
 }
 
+TEST_F(SurfaceOptions, WarnsOfLinesOutsideOfTheData) {
+  writeFileAtomically(file("far.csv"), "x,y,z\n900,0,0\n901,0,0\n");
+  writeFileAtomically(file("through.csv"), "x,y,z\n-900,0.5,0.5\n900,0.5,0.5\n");  // between its ends alone
+  const ProgramResult far =
+      run(render({"--lines", file("through.csv"), "--lines", file("far.csv"), "--points", file("far.csv")}));
+  const std::string outside = ": all of it lies outside of the data, which has x ";
+  EXPECT_NE(far.err.find("warning: --lines " + file("far.csv") + outside), std::string::npos) << far.err;
+  EXPECT_NE(far.err.find("warning: --points " + file("far.csv") + outside), std::string::npos) << far.err;
+  EXPECT_EQ(far.err.find("through.csv"), std::string::npos) << far.err;
+}
+
 TEST_F(SurfaceOptions, RefusesWrongUsage) {
   writeFileAtomically(*folder_ / "cut.stl", readTextFile(file("wall.obj")));
   const std::string cut = file("cut.stl"), sphere = file("sphere.obj");

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 #include <iterator>
 
@@ -184,6 +185,31 @@ TEST_F(WindowsCamera, KeysLookAlongTheAxes) {
   EXPECT_EQ(seen[last + 2].view_angle, seen[last].view_angle);
   EXPECT_GT(seen[last + 2].view_angle, 0);
   EXPECT_NEAR(glm::length(seen[last + 2].position - seen[last].position), 0, kRounded);
+}
+
+TEST_F(WindowsCamera, ArrowsTurnTheCameraAsTheOptionsDo) {
+  open();
+  press("z");
+  saveAndCopy();
+  press("i");
+  saveAndCopy();
+  for (const char* key : {"Right", "Up", "shift+Up"}) {
+    press(key);
+    saveAndCopy();
+  }
+  const std::vector<SeenFrom> seen = closeAndSee();
+  ASSERT_EQ(seen.size(), 5u);
+  const double degrees = glm::radians(15.0);
+  // From (1, 1, 1), about z; then towards z.
+  const double around = std::atan(1.0) + degrees, up = std::asin(1 / std::sqrt(3.0));
+  const auto forwardFrom = [](double azimuth, double elevation) {
+    return -glm::dvec3(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
+                       std::sin(elevation));
+  };
+  EXPECT_LE(glm::length(seen[2].forward() - forwardFrom(around, up)), kRounded);
+  EXPECT_LE(glm::length(seen[3].forward() - forwardFrom(around, up + degrees)), kRounded);
+  const auto distance = [](const SeenFrom& from) { return glm::length(from.position - from.focal_point); };
+  EXPECT_NEAR(distance(seen[3]) / distance(seen[4]), 1.2, 0.01);  // perspective
 }
 
 TEST_F(WindowsCamera, FliesThroughTheData) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "render/project/screen_view.h"
 
@@ -129,6 +130,54 @@ TEST_P(CameraControls, FlyingMovesAlongTheView) {
   const Camera after = flown(camera_, {0, 0, 2});
   expectNear(after.position - camera_.position, 2.0 * glm::normalize(camera_.focal_point - camera_.position));
   expectNear(after.focal_point - after.position, camera_.focal_point - camera_.position);
+}
+
+/// The camera after a command that turns, rolls or zooms.
+Camera afterCommand(Camera camera, Command command) {
+  Navigation navigation;
+  EXPECT_TRUE(navigation.run(command, camera, kSize));
+  return camera;
+}
+
+TEST_P(CameraControls, KeysTurnTheCameraAboutTheFocalPoint) {
+  const glm::dvec3 before = camera_.position - camera_.focal_point;
+  const auto degreesAround = [](const glm::dvec3& at) { return glm::degrees(std::atan2(at.y, at.x)); };
+  const auto degreesUp = [](const glm::dvec3& at) { return glm::degrees(std::asin(at.z / glm::length(at))); };
+  const struct {
+    Command command;
+    double around, up;
+  } cases[] = {{Command::kTurnRight, 15, 0},
+               {Command::kTurnLeft, -15, 0},
+               {Command::kTurnUp, 0, 15},
+               {Command::kTurnDown, 0, -15}};
+  for (const auto& [command, around, up] : cases) {
+    const Camera after = afterCommand(camera_, command);
+    expectNear(after.focal_point, camera_.focal_point);
+    const glm::dvec3 now = after.position - after.focal_point;
+    EXPECT_NEAR(glm::length(now), glm::length(before), 1e-9);
+    EXPECT_NEAR(degreesAround(now), degreesAround(before) + around, 1e-9);
+    EXPECT_NEAR(degreesUp(now), degreesUp(before) + up, 1e-9);
+  }
+}
+
+TEST_P(CameraControls, KeysRollAndZoomThePicture) {
+  const glm::dvec2 middle = pixelOf(camera_, camera_.focal_point);
+  const ViewAxes axes = camera_.axes();
+  const glm::dvec3 point = camera_.focal_point + 0.3 * axes.right;  // to the right of the middle
+  const double length = glm::length(pixelOf(camera_, point) - middle);
+  const double tilt = glm::radians(15.0);
+  const struct {
+    Command command;
+    glm::dvec2 expected;  // from the middle; y is down
+  } cases[] = {{Command::kRollLeft, {length * std::cos(tilt), -length * std::sin(tilt)}},
+               {Command::kRollRight, {length * std::cos(tilt), length * std::sin(tilt)}},
+               {Command::kZoomIn, {1.2 * length, 0}},
+               {Command::kZoomOut, {length / 1.2, 0}}};
+  for (const auto& [command, expected] : cases) {
+    const glm::dvec2 now = pixelOf(afterCommand(camera_, command), point) - middle;
+    EXPECT_NEAR(now.x, expected.x, 1e-9);
+    EXPECT_NEAR(now.y, expected.y, 1e-9);
+  }
 }
 
 TEST(CameraLooking, TurnsOnTheSpotByTheViewAngle) {

@@ -195,6 +195,10 @@ void render(const RenderArguments& given) {
                            !arguments.opacity.by.scalar.empty(), mapsOn(options.background)});
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
+  if (options.scene)
+    for (const std::string& miss :
+         curvesThatMiss(arguments.surfaces, *options.scene, manifest.lower, manifest.upper))
+      printMessage("warning: {}", miss);
   const bool of_colours = isoOfColours(arguments.opacity, arguments.scalar);
   for (const std::string& finer :
        isovaluesFinerThanStored(cache, of_colours ? shown : variable, arguments.surfaces.isovalues))

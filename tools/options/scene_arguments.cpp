@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
+#include <glm/vector_relational.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,7 @@
 
 #include "preprocess/formats/vtk/vtk_surface.h"
 #include "render/annotate/globe_box.h"
+#include "render/mesh/curve_set.h"
 #include "render/mesh/triangle_mesh.h"
 #include "render/surface/curve_times.h"
 #include "stream/base/error.h"
@@ -343,6 +345,45 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   return scene;
 }
 
+namespace {
+
+std::string boxText(const glm::dvec3& lower, const glm::dvec3& upper) {
+  return fmt::format("x {:.6g} to {:.6g}, y {:.6g} to {:.6g}, z {:.6g} to {:.6g}", lower.x, upper.x, lower.y,
+                     upper.y, lower.z, upper.z);
+}
+
+/// Whether the box around some segment of the lines, or some point, meets a box.
+bool meetsBox(const CurveSet& set, const glm::dvec3& lower, const glm::dvec3& upper) {
+  for (size_t line = 0; line < set.lines(); ++line)
+    for (uint32_t n = set.begins[line]; n < set.begins[line + 1]; ++n) {
+      const uint32_t next = std::min(n + 1, set.begins[line + 1] - 1);
+      const glm::dvec3 a = set.origin + glm::dvec3(set.positions[n]),
+                       b = set.origin + glm::dvec3(set.positions[next]);
+      if (glm::all(glm::lessThanEqual(glm::min(a, b), upper)) &&
+          glm::all(glm::greaterThanEqual(glm::max(a, b), lower)))
+        return true;
+    }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::string> curvesThatMiss(const SurfaceArguments& arguments, const SurfaceScene& scene,
+                                        const glm::dvec3& lower, const glm::dvec3& upper) {
+  std::vector<std::string> misses;
+  if (arguments.map.map) return misses;
+  const std::vector<std::string>&lines = arguments.curves.lines, &points = arguments.curves.points;
+  for (size_t n = 0; n < scene.curves.size(); ++n) {
+    const Curves& curves = scene.curves[n];
+    if (meetsBox(curves.whole ? *curves.whole : *curves.set, lower, upper)) continue;
+    const bool is_line = n < lines.size();
+    misses.push_back(fmt::format("{} {}: all of it lies outside of the data, which has {}",
+                                 is_line ? "--lines" : "--points",
+                                 is_line ? lines[n] : points.at(n - lines.size()), boxText(lower, upper)));
+  }
+  return misses;
+}
+
 std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const glm::dvec3& lower,
                                         const glm::dvec3& upper) {
   std::vector<std::string> misses;
@@ -351,10 +392,8 @@ std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const
     const double middle = glm::dot(slices[n].normal, 0.5 * (lower + upper) - slices[n].point);
     const double reach = glm::dot(glm::abs(slices[n].normal), 0.5 * (upper - lower));
     if (std::abs(middle) > reach)
-      misses.push_back(
-          fmt::format("--slice {} misses the data, which lies in x {:.6g} to {:.6g}, y {:.6g} to {:.6g}, z "
-                      "{:.6g} to {:.6g}",
-                      arguments.slices[n], lower.x, upper.x, lower.y, upper.y, lower.z, upper.z));
+      misses.push_back(fmt::format("--slice {} misses the data, which lies in {}", arguments.slices[n],
+                                   boxText(lower, upper)));
   }
   return misses;
 }

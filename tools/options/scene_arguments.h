@@ -92,6 +92,11 @@ std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, c
 std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const glm::dvec3& lower,
                                         const glm::dvec3& upper);
 
+/// One line for each file of lines or points, of those in `scene`, that is wholly outside of the data's box at all times: lines
+/// of other units, or coasts of another part of the Earth. None with --map, since such lines lie on it.
+std::vector<std::string> curvesThatMiss(const SurfaceArguments& arguments, const SurfaceScene& scene,
+                                        const glm::dvec3& lower, const glm::dvec3& upper);
+
 /// Options of what is drawn over a picture, as given; checked and parsed later.
 struct AnnotationArguments {
   Annotations shown;

@@ -175,6 +175,10 @@ std::vector<std::string> warningsOf(const PictureArguments& arguments, const Ima
                                     const RenderedScene& scene) {
   std::vector<std::string> warnings =
       slicesThatMiss(arguments.surfaces, scene.manifest.lower, scene.manifest.upper);
+  if (scene.options.scene)
+    for (std::string& miss :
+         curvesThatMiss(arguments.surfaces, *scene.options.scene, scene.manifest.lower, scene.manifest.upper))
+      warnings.push_back(std::move(miss));
   if (std::string missed = rangeMissesScalar(scene.variable, scene.transfer_function); !missed.empty())
     warnings.push_back(std::move(missed));
   if (isEmpty(image, scene.options.background)) {

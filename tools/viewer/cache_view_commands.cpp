@@ -175,7 +175,8 @@ void CacheView::saveMovieOf(MovieKind kind) {
 
 void CacheView::moveCamera(Command command) {
   changed_ |= navigation_.run(command, state_.camera, data_size_);
-  if (command != Command::kOtherProjection && command != Command::kFly) fitted_width_ = data_size_.width;
+  const bool fits = command >= Command::kFit && command <= Command::kLookIsometric;
+  if (fits) fitted_width_ = data_size_.width;
 }
 
 }  // namespace curvisplat

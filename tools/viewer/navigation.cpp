@@ -9,6 +9,8 @@
 #include <cmath>
 #include <utility>
 
+#include "render/camera/camera_path.h"
+
 namespace curvisplat {
 namespace {
 
@@ -133,6 +135,8 @@ namespace {
 constexpr double kRestAfterSeconds = 0.2;        // no movement for this time
 constexpr double kWheelFactor = 1.1;             // per notch
 constexpr double kDragFactor = 1.01;             // per pixel
+constexpr double kTurnDegrees = 15;              // per key, for turning and rolling
+constexpr double kZoomFactor = 1.2;              // per key
 constexpr double kWheelFlight = 0.02;            // in diagonals of the data per notch
 constexpr double kFlightDiagonalsSeconds = 0.2;  // in diagonals of the data per second
 
@@ -193,6 +197,24 @@ bool Navigation::run(Command command, Camera& camera, ImageSize size) {
     return true;
   }
   switch (command) {
+    case Command::kTurnRight:
+    case Command::kTurnLeft:
+      camera = orbited(camera, command == Command::kTurnRight ? kTurnDegrees : -kTurnDegrees);
+      return true;
+    case Command::kTurnUp:
+    case Command::kTurnDown:
+      camera = elevated(camera, command == Command::kTurnUp ? kTurnDegrees : -kTurnDegrees);
+      return true;
+    case Command::kRollLeft:
+    case Command::kRollRight:
+      camera = rolled(camera, command == Command::kRollLeft ? kTurnDegrees : -kTurnDegrees);
+      return true;
+    case Command::kZoomIn:
+      camera = zoomed(camera, kZoomFactor);
+      return true;
+    case Command::kZoomOut:
+      camera = zoomed(camera, 1 / kZoomFactor);
+      return true;
     case Command::kFit:
       camera = refitted(camera, lower_, upper_, size);
       return true;

@@ -5,6 +5,7 @@
 //   middle or shift+left drag   pan
 //   wheel                       zoom; what is under the mouse stays there
 //   right drag                  zoom
+//   arrows                      turn, as --azimuth and --elevation; with shift roll and zoom
 //   flying: w s forwards and backwards, a d left and right, q e down and up, left drag looks around
 //
 // `movement` is in pixels of a window of `size`, x to the right, y down. The functions return the moved

@@ -420,6 +420,8 @@ std::vector<Window::Key> Window::takeKeys() {
     return std::string_view("ACVXYZ").find(static_cast<char>(key.code)) != std::string_view::npos;
   };
   if (ImGui::GetIO().WantTextInput) std::erase_if(keys, edits);
+  if (ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup))  // arrows choose in a list
+    std::erase_if(keys, [](const Key& key) { return key.code >= GLFW_KEY_RIGHT && key.code <= GLFW_KEY_UP; });
   if (keyboardFocus().isShown())
     std::erase_if(keys, [](const Key& key) { return key.code == GLFW_KEY_SPACE; });
   return keys;
