@@ -88,6 +88,28 @@ TEST(FaceCut, IsTheConditionalDistanceFromTheFace) {
   EXPECT_GT(cut_ones, 200);
 }
 
+// A splat along the axes, seen along z, has its scalar in three independent parts: the screen sees two of them, and the third
+// goes with the depth. What the screen does not see is that part and the residual; the correlation is the part's share of the
+// deviation. A face across the ray sees all of it.
+TEST(FaceCut, HasTheCorrelationOfScalarAndDepth) {
+  constexpr float kExact = 1e-6f;  // a low-pass that changes nothing
+  const ScreenRows rows{10, 0, 0, 0, 10, 0};
+  for (const float along : {-0.7f, 0.2f, 0.5f})
+    for (const float variance : {0.0f, 0.04f, 0.3f})
+      for (const float facing : {1.0f, -1.0f}) {
+        SplatPiece piece{{0, 0, 0}, {1, 2, 0.5f, 0, 0, 0}, {0.4f, -0.3f, along}, 0, 1};
+        piece.faces.add({{0, 0, facing}, 0.3f});
+        const double deviation = kKernelSigma * along;
+        const double expected = deviation / std::sqrt(deviation * deviation + variance);
+        const Ellipse ellipse = ellipseOf(rows, piece.shape, piece.slope, variance, 1, {kExact, kExact});
+        ScreenCut cut;
+        ASSERT_EQ(cutAtFaces(rows, piece, ellipse, kExact, cut), Remains::kSome);
+        EXPECT_NEAR(cut.correlation, expected, 1e-4) << along << ' ' << variance << ' ' << facing;
+        const ScreenDepth depth = depthAlongRay(rows, {0, 0, 1}, 0, piece, ellipse, kExact);
+        EXPECT_NEAR(depth.correlation, expected, 1e-4) << along << ' ' << variance;
+      }
+}
+
 TEST(FaceCut, LeavesAllOrNothingFarFromTheFace) {
   Example example(5);
   ScreenCut cut;
