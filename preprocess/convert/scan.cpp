@@ -90,6 +90,14 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description) {
   const std::string file = description.files.empty() ? description.format : description.files.front();
   const bool all_blanked = survey.nodes == survey.blanked.total();
   if (all_blanked && !survey.blanked.lost.empty()) throw DifferingBlanks(survey.blanked.lost, false);
+  const auto isFlat = [](const GridBlock& block) { return std::min({block.ni, block.nj, block.nk}) < 2; };
+  if (all_blanked && survey.blanked.not_finite == survey.nodes && !description.blocks.empty() &&
+      std::ranges::all_of(description.blocks, isFlat))
+    throw NothingToDraw(
+        "{}: the grid is flat: its {} nodes lie in blocks of a single plane, which have no volume; no value "
+        "of the "
+        "chosen scalars is finite there, and there is nothing to draw",
+        file, survey.nodes);
   if (all_blanked)
     throw NothingToDraw(
         "{}: all {} samples are blanked ({} by the grid, {} by value, {} not finite in single "

@@ -355,6 +355,13 @@ class MeshFoam(MeshCase):
             self.assertIn("1 of 2 regions have no U", info["warnings"][0])
             self.assertIn("constant/fluid gives one of them", info["notes"][0])
             self.assertAlmostEqual(self.volume(path, "T"), 2, delta=4e-3)
+        faces = case / "constant" / "solid" / "polyMesh" / "faces"
+        faces.rename(faces.with_name("kept"))
+        info = self.info(case)
+        self.assertEqual([piece["name"] for piece in info["pieces"]], ["fluid"])
+        self.assertIn("the file 'faces' is missing in constant/solid/polyMesh: what lies there is left out", info["warnings"])
+        self.assertEqual(self.info(case / "constant" / "fluid")["warnings"], [])
+        faces.with_name("kept").rename(faces)
         info = self.info(case / "constant" / "solid")
         self.assertEqual(([piece["name"] for piece in info["pieces"]], info["scalars"][0]["max"]), (["solid"], 301))
         # A mesh outside of regions is read alone, and so are the regions of processors.

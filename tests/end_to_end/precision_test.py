@@ -112,6 +112,42 @@ class Precision(StructuredFormats):
         self.assertGreater(bounds[0], 0.1)
         self.assertLess(bounds[1], 0.01)
 
+    def test_warnings_of_finer_differences(self):
+        """A range of fewer than 100 steps of the stored values, and an isovalue that lies between two of them."""
+        def warnings(*words):
+            result = self.run_program(*words)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return [line for line in result.stderr.splitlines() if "stored values" in line]
+
+        picture = ["-o", self.folder / "a.png", "--size", "20x20"]
+        path = self.vtk_file([self.block()])
+        cache = self.convert(path, "--value-precision", "normal")
+        step = 2 * self.info(cache)["stored_within"][0]
+        self.assertGreater(step, 0.5)
+        self.assertEqual(warnings("render", cache, *picture, "--range", f"0,{101 * step}"), [])
+        said = warnings("render", cache, *picture, "--range", f"0,{99 * step}")
+        self.assertEqual(len(said), 1)
+        self.assertIn(f"of p is finer than its stored values, which have steps of up to {step:.2g} there; convert again with --value-precision auto or fine",
+                      said[0])
+        self.assertEqual(len(warnings("render", cache, *picture, "--iso", "0.5", "--range", f"0,{101 * step}")), 1)
+        self.assertEqual(len(warnings("render", cache, *picture, "--range", f"0,{99 * step}", "--iso", "0.5")), 2)
+        self.assertEqual(len(warnings("export", cache, "--iso", "0.5", "-o", self.folder / "a.ply")), 1)
+        self.assertEqual(warnings("export", cache, "--iso", "0.5", "--source", "-o", self.folder / "b.ply"), [])
+        # The opacities' scalar is another one.
+        both = self.folder / "both.splats"
+        result = self.run_program("convert", path, "-o", both, "--scalar", "p,volume", "--value-precision", "normal")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        by = ["--scalar", "volume", "--opacity-by", "p", "--opacity-range"]
+        self.assertEqual(warnings("render", both, *picture, *by, f"0,{101 * step}"), [])
+        self.assertEqual(len(warnings("render", both, *picture, *by, f"0,{99 * step}")), 1)
+        # By their own scale the small values are stored more finely.
+        cache = self.convert(path)
+        self.assertEqual(warnings("render", cache, *picture, "--range", f"0,{99 * step}", "--iso", "0.5"), [])
+        # Steps of `fine` are 1/256 of those of `normal`, 0.0024; those of `auto` 1/1024 of the spread, which is below 1.
+        said = warnings("render", cache, *picture, "--range", "0.5,0.51")
+        self.assertEqual(len(said), 1)
+        self.assertIn("; no precision stores finer ones there", said[0])
+
     def test_series(self):
         """Steps that are predicted from earlier ones."""
         blocks, alone = [self.block() for _ in range(4)], []

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "preprocess/contour/contour.h"
+#include "render/automatic/stored_steps.h"
 #include "render/export/gaussian_files.h"
 #include "render/export/gaussian_splats.h"
 #include "render/export/iso_mesh.h"
@@ -32,7 +33,6 @@
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
-#include "tools/output/stored_steps.h"
 
 namespace curvisplat {
 namespace {
@@ -169,6 +169,9 @@ void exportIsosurface(ExportArguments& arguments) {
     checkOutputFile("-o", arguments.output, inputs);
     return exportContour(arguments, cache, variable);
   }
+  for (const std::string& finer :
+       finerThanStored(cache, {{}, variable, {fmt::format("{:g}", options.value)}}))
+    printMessage("warning: {}", finer);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const IsoMeshReport report = writeIsoMesh(cache, variable, options, arguments.output, progress);
@@ -239,7 +242,7 @@ void exportCache(ExportArguments& arguments) {
   PictureChoice choice(cache, variable, glm::dvec3(1));
   const TransferFunction function = choice.function(arguments.scalar);
   for (const std::string& note : function.notes()) printMessage("note: {}", note);
-  const std::string finer = functionFinerThanStored(cache, variable, function);
+  const std::string finer = axisFinerThanStored(cache, {variable, function.axis()});
   if (!finer.empty()) printMessage("warning: {}", finer);
 
   if (!arguments.no_comparison) requireThreads();  // before the file is written

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "render/annotate/globe_box.h"
+#include "render/automatic/stored_steps.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
 #include "render/image/image_file.h"
@@ -41,7 +42,6 @@
 #include "tools/output/picture_page.h"
 #include "tools/output/results.h"
 #include "tools/output/start_checks.h"
-#include "tools/output/stored_steps.h"
 
 namespace curvisplat {
 namespace {
@@ -185,8 +185,6 @@ void render(const RenderArguments& given) {
   for (const auto& [of, function] : {std::pair(variable, &transfer_function), {shown, &colours}}) {
     const std::string range_warning = rangeMissesScalar(variableFor(cache, of, drawn), *function);
     if (!range_warning.empty()) printMessage("warning: {}", range_warning);
-    const std::string finer = functionFinerThanStored(cache, of, *function);
-    if (!finer.empty()) printMessage("warning: {}", finer);
     if (!scalars.colour) break;
   }
 
@@ -201,7 +199,9 @@ void render(const RenderArguments& given) {
       printMessage("warning: {}", miss);
   const bool of_colours = isoOfColours(arguments.opacity, arguments.scalar);
   for (const std::string& finer :
-       isovaluesFinerThanStored(cache, of_colours ? shown : variable, arguments.surfaces.isovalues))
+       finerThanStored(cache, {{{variable, transfer_function.axis()}, {shown, colours.axis()}},
+                               of_colours ? shown : variable,
+                               arguments.surfaces.isovalues}))
     printMessage("warning: {}", finer);
 
   const ImageSize picture = options.size;

@@ -11,13 +11,13 @@
 
 #include "render/annotate/annotations.h"
 #include "render/annotate/globe_box.h"
+#include "render/automatic/stored_steps.h"
 #include "stream/base/error.h"
 #include "tools/options/globe_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/output/empty_picture.h"
 #include "tools/output/start_checks.h"
-#include "tools/output/stored_steps.h"
 #include "tools/python/interruptible.h"
 #include "tools/view/edited_function.h"
 
@@ -319,11 +319,11 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments, image,
         {manifest, manifest.variables[scalars.opacity.variable], function, at, frame, picture.statistics});
     const TransferFunction& colours = scalars.colour ? scalars.colour->function : function;
-    if (std::string finer = functionFinerThanStored(reader_, shown, colours); !finer.empty())
-      picture.warnings.push_back(std::move(finer));
     const bool iso_of_colours = isoOfColours(arguments.opacity, arguments.scalar);
-    for (std::string& finer : isovaluesFinerThanStored(
-             reader_, iso_of_colours ? shown : scalars.opacity.variable, arguments.surfaces.isovalues))
+    for (std::string& finer :
+         finerThanStored(reader_, {{{scalars.opacity.variable, function.axis()}, {shown, colours.axis()}},
+                                   iso_of_colours ? shown : scalars.opacity.variable,
+                                   arguments.surfaces.isovalues}))
       picture.warnings.push_back(std::move(finer));
     if (!(annotations == Annotations{})) {
       AnnotatedScene scene{size,

@@ -41,6 +41,19 @@ std::vector<std::string> foamRegionsIn(const fs::path& folder) {
   return regions;
 }
 
+std::vector<std::string> foamMeshesWithoutFaces(const fs::path& folder) {
+  std::vector<fs::path> meshes{fs::path("constant") / "polyMesh"};
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder / "constant", error))
+    meshes.push_back("constant" / entry.path().filename() / "polyMesh");
+  std::vector<std::string> found;
+  for (const fs::path& mesh : meshes)
+    if (FoamFile::exists(folder / mesh / "points") && !FoamFile::exists(folder / mesh / "faces"))
+      found.push_back(mesh.string());
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
 bool hasFoamMesh(const fs::path& folder) {
   return hasFoamMesh(folder, "") || !foamRegionsIn(folder).empty();
 }

@@ -23,6 +23,8 @@ bool hasFoamMesh(const std::filesystem::path& folder, const std::filesystem::pat
 bool hasFoamMesh(const std::filesystem::path& folder);
 /// The regions with names that have a mesh of their own, in the order of their names.
 std::vector<std::string> foamRegionsIn(const std::filesystem::path& folder);
+/// The meshes of which the file of the faces is missing, though that of the points is there, as folders: "constant/fluid/polyMesh".
+std::vector<std::string> foamMeshesWithoutFaces(const std::filesystem::path& folder);
 
 /// Names the place of a processor's files.
 struct FoamProcessor {

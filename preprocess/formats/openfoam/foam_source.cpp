@@ -168,7 +168,13 @@ void FoamSource::chooseRegions(const std::string& asked) {
     if (whole) pieces_.push_back(of);
     for (const std::string& region : regions)
       if (asked == region || (asked.empty() && !whole)) pieces_.emplace_back(of).region = region;
-    if (&of != &folders.front() || regions.empty()) continue;
+    if (&of != &folders.front()) continue;
+    const std::vector<std::string> lacking =
+        asked.empty() ? foamMeshesWithoutFaces(of.folder) : std::vector<std::string>{};
+    if (!lacking.empty())
+      description_.warnings.push_back(
+          fmt::format("the file 'faces' is missing in {}: what lies there is left out", listed(lacking)));
+    if (regions.empty()) continue;
     const std::string how =
         decomposed_
             ? "reconstructPar -allRegions, and then the folder constant/REGION, gives one of them"
