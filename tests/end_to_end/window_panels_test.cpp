@@ -351,6 +351,24 @@ TEST_F(WindowPanels, TheGradientsHistogramSaysMagnitudesAndShares) {
   close();
 }
 
+/// The scalar of the scene reaches from 0 to about 1, and is stored in 65,535 steps.
+TEST_F(WindowPanels, WarnsOfARangeThatIsFinerThanTheStoredValues) {
+  open();
+  placeOf("range");
+  EXPECT_FALSE(hasWidget("warning "));
+  click(placeOf("range", 0.15));
+  press("ctrl+a");
+  act({"type", "0.49999"});
+  press("Tab");
+  press("ctrl+a");
+  act({"type", "0.50001"});
+  press("Return");
+  EXPECT_TRUE(eventually([] { return hasWidget("warning the range 0.49999..0.50001 of f is finer than"); }));
+  click("full range");
+  EXPECT_TRUE(eventually([] { return !hasWidget("warning "); }));
+  close();
+}
+
 TEST_F(WindowPanels, OpacitiesOfAnotherScalar) {
   open();
   const Image one = saveAndCopy();

@@ -318,6 +318,13 @@ def editing(tab):
     changes(tab, lambda: choose_map(tab, "magma"), "other colours", "colours")
     expect(tab.run("document.getElementById('maps').hidden && document.getElementById('map').textContent") == "magma", "its name is shown")
     numbers(tab)
+    low, high = tab.run("range()")
+    expect(tab.run("document.getElementById('finer').hidden"), "its range is not finer than the stored values")
+    changes(tab, lambda: set_value(tab, "#high", repr(low + 1e-5)), "a range of less than a step of the stored values")
+    tab.wait("!document.getElementById('finer').hidden", "the warning of it")
+    expect("is finer than its stored values" in tab.run("document.getElementById('finer').textContent"), "the warning says why")
+    changes(tab, lambda: set_value(tab, "#high", repr(high)), "the range before")
+    tab.wait("document.getElementById('finer').hidden", "no warning any more")
     changes(tab, lambda: set_value(tab, "#high", "0.8"), "another range")
     changes(tab, lambda: set_value(tab, "#unit", "0.5"), "another opacity unit")
     for name, opacities in (("ramp", [0, 1]), ("clear", [0, 0]), ("band", [0, 0, 0.5, 0, 0])):

@@ -8,12 +8,16 @@
 #include <cmath>
 #include <glm/trigonometric.hpp>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "render/project/light.h"
+#include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 #include "tools/panels/labels.h"
 #include "tools/panels/picture_signs.h"
+#include "tools/window/reports.h"
 #include "tools/window/widgets.h"
 
 namespace curvisplat {
@@ -119,6 +123,7 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
   ImGui::SameLine(0.5f * ImGui::GetContentRegionMax().x);
   commandOption(Command::kPlaneFrames, actions, "frames of cuts", facts.shows_frames);
   surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
+  if (!state.isosurfaces.empty()) drawFinerThanStored(state, facts);
   cuts_.draw(state, actions);
   std::optional<size_t> seen = state.markers.size();  // a click in the picture unfolds nothing
   if (const Section open{"Markers", seen, state.markers.size()})
@@ -250,6 +255,25 @@ void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t ste
   } else {
     draw(function_, state.function, state.variable, Shows::kAll);
   }
+}
+
+/// Draws warnings where the picture asks for finer differences than are stored.
+void Panels::drawFinerThanStored(const ViewState& state, const PanelFacts& facts) {
+  std::pair asked(facts.playback ? facts.playback->step() : uint64_t{0}, state.askedDifferences(cache_));
+  if (asked_ != asked) {
+    try {
+      finer_ = finerThanStored(cache_.atStep(asked.first), asked.second);
+    } catch (const Error&) {
+      finer_.clear();  // the picture reports what cannot be read
+    }
+    asked_ = std::move(asked);
+  }
+  ImGui::PushTextWrapPos(0);
+  for (const std::string& text : finer_) {
+    ImGui::TextUnformatted(inWindowsWords(text).c_str());
+    nameWithoutTab("warning " + text);
+  }
+  ImGui::PopTextWrapPos();
 }
 
 namespace {
@@ -410,6 +434,7 @@ void Panels::drawColour(ViewState& state, const PanelFacts& facts, PanelActions&
   drawScalars(state, facts, actions);
   ImGui::Spacing();
   drawFunctions(state, actions, facts.playback ? facts.playback->step() : 0);
+  drawFinerThanStored(state, facts);
   ImGui::Separator();
   const std::string& scalar = state.opacity_by ? state.opacity_by->variable : state.variable;
   const GradientPanel::Result result =

@@ -7,8 +7,10 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "render/automatic/stored_steps.h"
 #include "render/frame/frame_statistics.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/panels/film_panel.h"
@@ -76,6 +78,7 @@ class Panels {
   void drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawOpacityScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawFunctions(ViewState& state, PanelActions& actions, uint64_t step);
+  void drawFinerThanStored(const ViewState& state, const PanelFacts& facts);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);
   void drawDetail(ViewState& state, PanelActions& actions);
@@ -85,6 +88,8 @@ class Panels {
   SurfacePanel surfaces_;
   FunctionPanel function_, opacity_function_;
   GradientPanel gradient_;
+  std::optional<std::pair<uint64_t, AskedDifferences>> asked_;  // the step, and what `finer_` answers
+  std::vector<std::string> finer_;                              // warnings: finerThanStored()
   std::string view_name_;
   FilmPanel film_;
   std::optional<size_t> objects_seen_, keys_seen_;  // in the frame before

@@ -205,7 +205,16 @@ class RemoteViewer::Work {
     if (picked_) frames_->requestValues();
     // A page that asks faster than pictures come does not make this grow.
     if (asked_.size() == kMaxAsked) asked_.pop_front();
+    if (!view.moving) warnOfFiner(view, state);
     asked_.push_back({number, view, std::move(state), reduction_, picture, data});
+  }
+
+  /// Sends the warnings of a view at rest, unless the last ones are about the same.
+  void warnOfFiner(const ViewRequest& view, const ViewState& state) {
+    ServedCaches::AskedStep asked{view.cache, view.step, state.askedDifferences(caches_.reader(view.cache))};
+    if (warned_of_ == asked) return;
+    answer([&] { return caches_.finerText(view.number, asked); });
+    warned_of_ = std::move(asked);
   }
 
   /// Draws the newest request's picture with fewer pixels.
@@ -306,6 +315,7 @@ class RemoteViewer::Work {
   bool woken_ = false;
   size_t cache_ = 0;
   GlobeGrid globe_grid_;  // of that cache
+  std::optional<ServedCaches::AskedStep> warned_of_;
   std::string function_text_;
   uint64_t function_version_ = 0;
   std::deque<Asked> asked_;

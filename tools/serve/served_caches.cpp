@@ -176,6 +176,13 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
   return textOf(json);
 }
 
+std::string ServedCaches::finerText(uint64_t number, const AskedStep& asked) const {
+  const MutexLock lock(reading_);
+  const CacheReader reader = caches_[asked.cache].reader.atStep(asked.step);
+  return textOf(
+      {{"type", "finer"}, {"number", number}, {"texts", finerThanStored(reader, asked.differences)}});
+}
+
 std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& scalar,
                                      const std::optional<glm::dvec3>& point) const {
   const Served& cache = caches_[cache_number];

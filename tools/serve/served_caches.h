@@ -49,6 +49,14 @@ class ServedCaches {
   };
   std::string markerText(size_t cache, const MarkedScalar& scalar,
                          const std::optional<glm::dvec3>& point) const;
+  /// Warnings where a view asks for finer differences than the cache stores at the step: finerThanStored(). `number`: of the view's request.
+  struct AskedStep {
+    size_t cache = 0;
+    uint64_t step = 0;
+    AskedDifferences differences;
+    bool operator==(const AskedStep&) const = default;
+  };
+  std::string finerText(uint64_t number, const AskedStep& asked) const;
   static std::string coloursText(const ColoursRequest& request);
   std::string isosurfaceText(const IsosurfaceRequest& request) const;
   /// The `curvisplat render` command that draws a view, for a folder that has the cache, and the files of functions that its

@@ -62,6 +62,8 @@ class EditedFunction {
   void fitRange(double low, double high);
   bool logScale() const { return definition_.log_scale; }
   bool asinhScale() const { return asinh_.has_value(); }
+  /// The range with its scale.
+  ScalarAxis axis() const { return {range_, logScale(), asinh_}; }
   /// The scalar at a coordinate, and the coordinate of a scalar, which may lie outside 0..1.
   double scalarAt(double x) const { return axis().scalarAt(x); }
   double coordinateOf(double scalar) const { return axis().fractionOf(scalar); }
@@ -101,7 +103,6 @@ class EditedFunction {
   glm::dvec3 colourAt(double x) const;
 
  private:
-  ScalarAxis axis() const { return {range_, logScale(), asinh_}; }
   void edited() { preset_.clear(); }
   void coloursEdited() { preset_.clear(), map_.clear(); }
 

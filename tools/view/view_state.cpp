@@ -289,6 +289,18 @@ std::vector<Isosurface> ViewState::drawnIsosurfaces() const {
   return drawn;
 }
 
+AskedDifferences ViewState::askedDifferences(const CacheReader& cache) const {
+  AskedDifferences asked{{{cache.variableNamed(variable), function.axis()}},
+                         cache.variableNamed(isoScalar())};
+  if (opacity_by && drawsVolume())
+    asked.axes.push_back({cache.variableNamed(opacity_by->variable), opacity_by->function.axis()});
+  if (faces_by && std::ranges::any_of(faces, &NamedFaces::visible))
+    asked.axes.push_back({cache.variableNamed(faces_by->variable), faces_by->function.axis()});
+  for (const Isosurface& one : drawnIsosurfaces())
+    asked.isovalues.push_back(fmt::format("{:.6g}", one.value));
+  return asked;
+}
+
 void ViewState::takeOpacitiesFor(const std::string& scalar) {
   if (opacities_before)
     opacities_before->drawn = scalar;

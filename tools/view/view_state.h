@@ -15,6 +15,7 @@
 
 #include "render/annotate/annotated_scene.h"
 #include "render/annotate/annotations.h"
+#include "render/automatic/stored_steps.h"
 #include "render/camera/camera.h"
 #include "render/frame/frame.h"
 #include "stream/cache/manifest.h"
@@ -158,6 +159,8 @@ struct ViewState {
   double verticalScale(const std::optional<Globe>& globe) const;
   /// Changes it, and keeps the same place in focus.
   void setVerticalScale(double factor, const std::optional<Globe>& globe);
+  /// The differences of scalars that its functions and isosurfaces ask for, of a cache that has them.
+  AskedDifferences askedDifferences(const CacheReader& cache) const;
   /// The options of a frame whose grid surfaces have their look; their faces are found by faceNames().
   FrameOptions frameOptions(ImageSize size) const;
 };
