@@ -45,9 +45,9 @@ TEST_F(WindowKeyboard, TabReachesEveryTabOfThePanels) {
     const char* tab;
     std::vector<std::string> widgets;
   } tabs[] = {{"Colour",
-               {"scalar", "colours", "range 1", "range 2", "log scale", "full range", "automatic", "ramp",
-                "band", "clear", "opacity unit 1", "strength", "opacity points", "colour points", "load",
-                "save", "gradient opacity"}},
+               {"scalar", "colours", "range 1", "range 2", "log scale", "full range", "percentile range",
+                "automatic", "ramp", "band", "clear", "opacity unit 1", "strength", "opacity points",
+                "colour points", "load", "save", "gradient opacity"}},
               {"Objects",
                {"eye of volume",
                 "Frames of cuts",
@@ -78,7 +78,7 @@ TEST_F(WindowKeyboard, TabReachesEveryTabOfThePanels) {
     const std::vector<std::string> names = round();
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
     for (const char* const wanted :
-         {"tab Colour", "tab Objects", "tab View", "Save picture", "menu File", "menu Help"})
+         {"tab Colour", "tab Objects", "tab View", "Save picture as...", "menu File", "menu Help"})
       EXPECT_NE(std::ranges::find(names, wanted), names.end()) << shown << ' ' << wanted;
     size_t place = 0;
     for (const std::string& wanted : widgets) {

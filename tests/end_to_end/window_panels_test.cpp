@@ -529,6 +529,78 @@ TEST_F(WindowPanels, EditsColoursAndKeepsThemBesideThePicture) {
   expectDraws(command, edited);
 }
 
+/// The range is that of `render --range 1%,99%`.
+TEST_F(WindowPanels, ARangeLeavesOutOnePercentAtEachEnd) {
+  open();
+  const Image whole = save();
+  click("percentile range");
+  const Image most = saveAndCopy();
+  EXPECT_LT(difference(whole, most), 50);
+  const auto range = numbersOf(valueOf(close().at(0), "--range"));
+  const auto percentiles =
+      nlohmann::json::parse(run({"info", "--json", "a.splats"}).out).at("histograms")[0].at("percentiles");
+  EXPECT_NEAR(range[0], percentiles[10].get<double>(), 1e-3);
+  EXPECT_NEAR(range[1], percentiles[990].get<double>(), 1e-3);
+}
+
+/// The button chooses range and opacities; the colours are chosen in their own list.
+TEST_F(WindowPanels, AutomaticOpacitiesKeepTheChosenColours) {
+  open();
+  const Image first = save();
+  click("colours");
+  click("colours viridis");
+  const Image viridis = save();
+  click("clear");
+  EXPECT_LT(difference(viridis, save()), 50);
+  click("automatic");
+  EXPECT_TRUE(eventually([&] { return difference(save(), viridis) >= 50; }));
+  click("colours");
+  click("colours chosen from the data");
+  EXPECT_TRUE(eventually([&] { return difference(save(), first) >= 50; }));
+  close();
+}
+
+/// A point in the curve's corner lies half outside of it, and can be taken there.
+TEST_F(WindowPanels, PointsOnTheCurvesEdgeAreTakenByTheirOuterHalves) {
+  open();
+  save();
+  click("clear");
+  const Image nothing = save();
+  const auto [x, y] = placeOf("curve", 1, 1);
+  drag(1, {x + 3, y + 3}, placeOf("curve", 1, 0.2));
+  EXPECT_LT(difference(nothing, save()), 45);
+  close();
+}
+
+/// The button below the panels asks for name and size; the folder that was typed is offered the next time.
+TEST_F(WindowPanels, ThePictureDialogOffersItsLastFolder) {
+  open();
+  save();
+  fs::create_directory("pictures");
+  click("Save picture as...");
+  answer(fs::absolute("pictures/one.png").string());
+  EXPECT_TRUE(eventually([] { return fs::exists("pictures/one.png"); }));
+  click("Save picture as...");
+  EXPECT_TRUE(eventually([] { return hasWidget("file one.png"); }));
+  press("Escape");
+  close();
+}
+
+/// Braces in it are no fields of --title.
+TEST_F(WindowPanels, ATitleStandsAboveTheDataAndInTheCommand) {
+  open();
+  const Image without = save();
+  tab("View");
+  click("title");
+  act({"type", "Flow {1}"});
+  press("Return");
+  const Image with = saveAndCopy();
+  EXPECT_LT(difference(without, with), 60);
+  const auto command = close().at(0);
+  EXPECT_EQ(valueOf(command, "--title"), "Flow {{1}}");
+  expectDraws(command, with);
+}
+
 TEST_F(WindowPanels, ColourMapsAreChosenFromTheirSwatches) {
   open();
   const Image first = save();

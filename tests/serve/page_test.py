@@ -4,6 +4,7 @@
     page_test.py PROGRAM [FOLDER]    FOLDER: keeps the screenshots there
 """
 import base64
+import json
 import pathlib
 import shlex
 import subprocess
@@ -325,6 +326,11 @@ def editing(tab):
     expect("is finer than its stored values" in tab.run("document.getElementById('finer').textContent"), "the warning says why")
     changes(tab, lambda: set_value(tab, "#high", repr(high)), "the range before")
     tab.wait("document.getElementById('finer').hidden", "no warning any more")
+    tab.wait("histogram && histogram.scalar === holder().variable", "the histogram")
+    changes(tab, lambda: tab.click("#fit-percentiles"), "the range without one per cent at each end")
+    stored = json.loads(subprocess.run([program, "info", "--json", f"{folder}/annulus.splats"], capture_output=True, text=True, check=True).stdout)["histograms"][0]
+    expected = [stored["percentiles"][n] for n in (10, 990)]
+    expect(all(abs(a - b) < 1e-5 for a, b in zip(tab.run("range()"), expected)), f"percentiles: {tab.run('range()')}, {expected}")
     changes(tab, lambda: set_value(tab, "#high", "0.8"), "another range")
     changes(tab, lambda: set_value(tab, "#unit", "0.5"), "another opacity unit")
     for name, opacities in (("ramp", [0, 1]), ("clear", [0, 0]), ("band", [0, 0, 0.5, 0, 0])):

@@ -242,6 +242,19 @@ TEST(ViewState, AnAutomaticFunctionComesBackWithItsScale) {
   }
 }
 
+TEST(ViewState, ATitleComesBackAndALongOneIsCutBetweenLetters) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  EXPECT_FALSE(state.annotations.texts);
+  state.setTitle("wake {1}");
+  const ViewState again = viewStateFromJson(toJson(state), "a.json", manifest());
+  EXPECT_EQ(again.title, "wake {1}");
+  EXPECT_TRUE(again.annotations.texts);
+  state.setTitle("a" + std::string(198, 'b') + "\u00e4");  // 201 bytes
+  EXPECT_EQ(state.title, "a" + std::string(198, 'b'));
+  state.setTitle("");
+  EXPECT_FALSE(viewStateFromJson(toJson(state), "a.json", manifest()).annotations.texts);
+}
+
 TEST(ViewState, MarkersAndTheOpacityScalarComeBack) {
   const ViewState again = viewStateFromJson(toJson(changedState()), "a.json", manifest());
   ASSERT_TRUE(again.opacity_by);

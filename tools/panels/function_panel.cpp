@@ -13,6 +13,7 @@
 
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
+#include "stream/cache/value_histogram.h"
 #include "tools/panels/function_painting.h"
 #include "tools/panels/labels.h"
 #include "tools/view/edited_function.h"
@@ -53,6 +54,20 @@ std::optional<size_t> pointNear(const EditedFunction& function, const CurveCanva
     nearest = n;
   }
   return nearest;
+}
+
+/// Draws the button that takes the mouse for the curve, and returns whether the mouse is over it. It reaches beyond the
+/// canvas, so that points on the canvas's edge can be taken by their outer halves, too.
+bool isReached(const CurveCanvas& canvas) {
+  const float margin = kGrabRadius * ImGui::GetFontSize();
+  ImGui::SetCursorScreenPos({canvas.lower.x - margin, canvas.lower.y - margin});
+  ImGui::InvisibleButton("curve reach", {canvas.size.x + 2 * margin, canvas.size.y + 2 * margin},
+                         ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  const bool reached = ImGui::IsItemHovered();
+  ImGui::SetCursorScreenPos(canvas.lower);
+  ImGui::Dummy(canvas.size);
+  nameWithoutTab("curve");
+  return reached;
 }
 
 }  // namespace
@@ -124,12 +139,10 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
 bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> marked, bool has_colours) {
   const CurveCanvas canvas{ImGui::GetCursorScreenPos(),
                            {availableWidth(), kCurveLines * ImGui::GetTextLineHeight()}};
-  ImGui::InvisibleButton("curve", canvas.size,
-                         ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
-  nameWithoutTab("curve");
+  const bool reached = isReached(canvas);
   const ImVec2 mouse = ImGui::GetIO().MousePos;
-  const bool over = ImGui::IsItemHovered();
-  const std::optional<size_t> near = over ? pointNear(function, canvas, mouse) : std::nullopt;
+  const std::optional<size_t> near = reached ? pointNear(function, canvas, mouse) : std::nullopt;
+  const bool over = near || (reached && ImGui::IsMouseHoveringRect(canvas.lower, canvas.at(1, 0)));
   bool changed = false;
   if (over && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
     if (!near) changed = true;
@@ -218,7 +231,7 @@ bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
     nameWidget("colours");
     return false;
   }
-  if (ImGui::Selectable("chosen from the data")) result.automatic = true;
+  if (ImGui::Selectable(EditedFunction::kAutomatic, function.isAutomatic())) result.automatic = true;
   nameWidget("colours chosen from the data");
   for (const auto& [category, title] : {std::pair(MapCategory::kSequential, "sequential"),
                                         {MapCategory::kDiverging, "diverging"},
@@ -229,7 +242,7 @@ bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
       const std::string name(one.name);
       const ImVec2 at = ImGui::GetCursorScreenPos();
       const float swatch = 7 * ImGui::GetFontSize();
-      const bool chosen = ImGui::Selectable(("##" + name).c_str(), name == map);
+      const bool chosen = ImGui::Selectable(("##" + name).c_str(), !function.isAutomatic() && name == map);
       nameWidget("colours " + name);
       const TransferFunctionDefinition& preset = definitionOf(name);
       const ColourMap colours(preset.colours, preset.colour_space);
@@ -329,11 +342,24 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
   ImGui::SameLine();
   if (ImGui::Button("Full range")) set(all.min, all.max);
   nameWidget("full range");
+  hint("from the lowest to the highest value");
+  ImGui::SameLine();
+  if (ImGui::Button("1-99 %")) try {
+      if (const auto histogram = stepHistogram(cache_, variable))
+        set(histogram->percentile(0.01), histogram->percentile(0.99));
+      else
+        result.error = "percentiles are known neither between two time steps nor in caches of early versions";
+    } catch (const Error& error) {
+      result.error = error.what();
+    }
+  nameWidget("percentile range");
+  hint("without the lowest and the highest values, which fill 1 % of the volume each");
   if (steps.size() > 1) {
     ImGui::SameLine();
     const StepValues& of = steps[step].values[variable];
-    if (ImGui::Button("Range of this step")) set(of.min, of.max);
+    if (ImGui::Button("This step")) set(of.min, of.max);
     nameWidget("range of this step");
+    hint("from the lowest to the highest value of this time step");
   }
   // The tick says which of the others it is.
   if (function.asinhScale()) {
@@ -354,8 +380,9 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
     hint(what);
     return pressed;
   };
-  result.automatic |=
-      button("automatic", "Automatic", "range and opacities as they are chosen from the data");
+  result.automatic_opacities |=
+      button("automatic", "Automatic",
+             "range and opacities chosen from the data; a colour map that you chose stays");
   const float gap = ImGui::GetStyle().ItemInnerSpacing.x;  // four of them fill the line
   ImGui::SameLine(0, gap);
   if (button("ramp", "Ramp", "the colour map with its own opacities, which rise with the values")) {
@@ -372,7 +399,8 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   };
   set("band", "Band", "values in the middle of the range alone; Shift + drag moves its points together",
       kBand);
-  set("clear", "Clear", "nothing; add points for what is to be seen", kClear);
+  set("clear", "Clear", "everything transparent; then click into the curve where values are to be seen",
+      kClear);
 }
 
 void FunctionPanel::drawUnit(EditedFunction& function, Result& result) {

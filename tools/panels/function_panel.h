@@ -24,10 +24,11 @@ class FunctionPanel {
   enum class Shows { kAll, kColours, kOpacities };
   struct Result {
     bool changed = false;
-    bool automatic = false;           // the user asked for a function that is chosen from the data
-    bool dragging = false;            // a point is being dragged
-    bool load = false, save = false;  // the user asked to load a function, or to save this one
-    std::string error;                // of reading the histogram, or why what the user asked for cannot be
+    bool automatic = false;            // the user asked for a function that is chosen from the data
+    bool automatic_opacities = false;  // the same, but the colours stay
+    bool dragging = false;             // a point is being dragged
+    bool load = false, save = false;   // the user asked to load a function, or to save this one
+    std::string error;                 // of reading the histogram, or why what the user asked for cannot be
   };
   /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables. `step`: the
   /// one that is shown. `marked`: scalars that the curve marks by lines.

@@ -39,7 +39,7 @@ struct PanelActions {
   std::optional<std::pair<size_t, std::string>> isosurface_scalar;  // of the n-th one
   std::optional<std::string> colour_faces;  // by a scalar; the empty name: each has its own colour
   bool automatic_function = false;          // colours and opacities chosen from the data
-  bool automatic_opacities = false;         // the same of the other scalar's, which gives opacities
+  bool automatic_opacities = false;  // range and opacities alone, of the scalar that gives the opacities
   bool load_function = false, save_function = false;
   std::optional<std::string> load_view, save_view, remove_view;  // by name
   bool looks_for_scalars = false;          // for what the sources have and the cache lacks

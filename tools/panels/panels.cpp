@@ -55,7 +55,7 @@ int drawTabs(int number, int select) {
 
 void drawFooter(PanelActions& actions) {
   ImGui::Separator();
-  commandButton(Command::kSavePicture, actions, "Save picture");
+  commandButton(Command::kSavePictureAs, actions, "Save picture...");
   ImGui::SameLine();
   commandButton(Command::kSaveTurnMovie, actions, "Film once around...");
   ImGui::SameLine();
@@ -165,9 +165,11 @@ void drawFurther(const FurtherScalars& further, bool for_opacities, PanelActions
   }
   actions.looks_for_scalars = true;
   ImGui::Separator();
-  ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
-                            : further.is_busy  ? "one is being added"
-                                               : "more, added when chosen:");
+  const bool has_stored = std::ranges::any_of(further.scalars, [](const auto& one) { return !one.derived; });
+  if (further.is_looking || further.is_busy || has_stored)
+    ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
+                              : further.is_busy  ? "one is being added"
+                                                 : "more, added when chosen:");
   if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
   ImGui::BeginDisabled(further.is_busy);
   for (const bool derived : {false, true}) {
@@ -241,8 +243,8 @@ void Panels::drawFunctions(ViewState& state, PanelActions& actions, uint64_t ste
         panel.draw(function, cache_.variableNamed(variable), shows, step, isovalues);
     actions.function_changed |= result.changed;
     actions.dragging |= result.dragging;
-    (shows == Shows::kOpacities ? actions.automatic_opacities : actions.automatic_function) |=
-        result.automatic;
+    actions.automatic_function |= result.automatic;
+    actions.automatic_opacities |= result.automatic_opacities;
     actions.load_function |= result.load;
     if (!result.error.empty()) actions.error = result.error;
     actions.save_function |= result.save;
@@ -313,6 +315,18 @@ void drawLight(ViewState& state, PanelActions& actions) {
   state.light_direction = glm::dvec3(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
 }
 
+/// Draws the field of the text above the data.
+void drawTitle(ViewState& state, PanelActions& actions) {
+  label("title");
+  std::string title = state.title;
+  if (ImGui::InputTextWithHint("##title", "none", &title)) {
+    state.setTitle(std::move(title));
+    actions.changed = true;
+  }
+  nameWidget("title");
+  hint("text above the data, in pictures and films, too");
+}
+
 /// Draws how the picture looks around the data.
 void drawSurroundings(ViewState& state, PanelActions& actions) {
   const float column = 0.5f * ImGui::GetContentRegionAvail().x;
@@ -334,6 +348,7 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
   ImGui::SameLine(column);
   actions.changed |= ImGui::Checkbox("axes with numbers", &state.annotations.axes_grid);
   nameWidget("axes grid");
+  drawTitle(state, actions);
   if (!state.lit) return;
   const auto darkness = [&](const char* name, const char* id, double& value, const char* help) {
     auto shown = static_cast<float>(value);

@@ -246,7 +246,7 @@ void drawDistance(const Marker& from, const Marker& to, const std::optional<Glob
   const std::string text = fmt::format(
       "distance {} to {}: {:.5g}{}", from.name, to.name,
       glm::distance(unstretched(from.point, globe), unstretched(to.point, globe)), globe ? " km" : "");
-  ImGui::TextDisabled("%s", text.c_str());
+  ImGui::TextUnformatted(text.c_str());
   nameWidget(text);
   hint(!globe            ? "along a straight line, in the units of the coordinates"
        : globe->sphere() ? "along a straight line, through the Earth"
@@ -261,15 +261,14 @@ void drawMarkers(ViewState& state, const std::optional<Globe>& globe, PanelActio
   for (size_t n = 0; n < state.markers.size(); ++n) {
     Marker& marker = state.markers[n];
     ImGui::PushID(static_cast<int>(n));
-    if (ImGui::Button("x")) removed = n;
-    nameWidget(fmt::format("remove marker {}", n + 1));
-    hint("remove this marker");
-    ImGui::SameLine();
-    ImGui::SetNextItemWidth(6 * ImGui::GetFontSize());
+    ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - ImGui::CalcTextSize("Remove").x -
+                            2 * ImGui::GetStyle().FramePadding.x - ImGui::GetStyle().ItemSpacing.x);
     actions.changed |= ImGui::InputText("##name", &marker.name);
     nameWidget(fmt::format("marker {}", n + 1));
     if (ImGui::IsItemActive()) nameWidget(fmt::format("editing marker {}", n + 1));
     ImGui::SameLine();
+    if (ImGui::Button("Remove")) removed = n;
+    nameWidget(fmt::format("remove marker {}", n + 1));
     ImGui::TextWrapped(
         "%s", fmt::format("{} {:.5g}{}{}\n{}", marker.scalar, marker.value, marker.unit.empty() ? "" : " ",
                           marker.unit, placeText(marker.point, globe))

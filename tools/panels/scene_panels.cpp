@@ -48,7 +48,7 @@ PlaneScale planeScaleOf(const glm::dvec3& normal) {
     unit[axis] = 1;
     if (std::abs(along[axis]) > 1 - 1e-12) return {unit, kNames[static_cast<size_t>(axis)]};
   }
-  return {along, "place of plane"};
+  return {along, "position"};
 }
 
 /// How a coordinate of data between two ends is written: to a few thousandths of their distance, and 0 for a
@@ -72,6 +72,14 @@ void opacitySlider(const char* text, const std::string& name, double& opacity, P
   }
   actions.dragging |= isDragged();
   nameWidget(name);
+}
+
+/// Draws a checkbox that multiplies an opacity by the volume's. `name`: of the widget. Returns whether it changed.
+bool opacityByFunction(bool& by_function, const std::string& name) {
+  const bool changed = ImGui::Checkbox("times the volume's opacity", &by_function);
+  nameWidget(name);
+  hint("more transparent where the opacity curve is low");
+  return changed;
 }
 
 /// Returns where a button "Remove" at the right end of a line begins.
@@ -269,8 +277,7 @@ void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
     actions.changed = true;
   }
   actions.dragging |= isDragged();
-  actions.changed |= ImGui::Checkbox("times the volume's", &state.slice_opacity.by_function);
-  nameWidget("slices by function");
+  actions.changed |= opacityByFunction(state.slice_opacity.by_function, "slices by function");
 }
 
 void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions) {
@@ -315,8 +322,7 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
       removed = n;
     opacitySlider("opacity", "opacity of " + name, named.opacity.factor, actions);
     ImGui::BeginDisabled(!state.faces_by && !state.opacity_by);
-    actions.changed |= ImGui::Checkbox("times the volume's", &named.opacity.by_function);
-    nameWidget(name + " by function");
+    actions.changed |= opacityByFunction(named.opacity.by_function, name + " by function");
     ImGui::EndDisabled();
     const ImVec2 to(from.x + ImGui::GetContentRegionAvail().x, ImGui::GetCursorScreenPos().y);
     if (ImGui::IsWindowHovered() && !ImGui::IsAnyItemActive() && ImGui::IsMouseHoveringRect(from, to))
@@ -365,8 +371,7 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
   ImGui::BeginDisabled(state.isosurfaces.empty());
   opacitySlider("opacity", "opacity of isosurfaces", state.iso_opacity.factor, actions);
   ImGui::BeginDisabled(state.hasIsosurfacesOfThird());
-  actions.changed |= ImGui::Checkbox("times the volume's", &state.iso_opacity.by_function);
-  nameWidget("isosurfaces by function");
+  actions.changed |= opacityByFunction(state.iso_opacity.by_function, "isosurfaces by function");
   ImGui::EndDisabled();
   ImGui::EndDisabled();
   size_t removed = state.isosurfaces.size();
@@ -449,7 +454,7 @@ void SurfacePanel::drawColourOf(Isosurface& one, const std::string& name, const 
   actions.dragging |= isDragged();
   ImGui::SameLine();
   bool is_of_function = !one.colour;
-  if (ImGui::Checkbox("the function's", &is_of_function)) {
+  if (ImGui::Checkbox("from the colour map", &is_of_function)) {
     one.colour = is_of_function ? std::nullopt : std::optional(colour);
     actions.changed = true;
   }

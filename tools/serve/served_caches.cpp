@@ -10,6 +10,7 @@
 #include "stream/base/error.h"
 #include "stream/base/name_list.h"
 #include "stream/cache/probe.h"
+#include "stream/cache/value_histogram.h"
 #include "tools/view/edited_function.h"
 #include "tools/view/first_view.h"
 #include "tools/view/picture_layout.h"
@@ -173,6 +174,9 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
   EditedFunction function(kMapsOnDark.sequential, request.low, request.high, 1);
   function.setLogScale(request.log);
   json["bins"] = histogramOf(cache.reader, variable, function, kBins);
+  json["percentiles"] = nullptr;  // of 1 and 99 % of the volume
+  if (const auto stored = stepHistogram(cache.reader, variable))
+    json["percentiles"] = {stored->percentile(0.01), stored->percentile(0.99)};
   return textOf(json);
 }
 

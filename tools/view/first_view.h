@@ -46,7 +46,9 @@ class FunctionChooser {
   /// Calls `wake` when an answer has come. `cache` must outlive it.
   FunctionChooser(const CacheReader& cache, void (*wake)()) : cache_(cache), wake_(wake) {}
 
-  enum class For { kScalar, kOpacities, kSameScalar, kFaces };
+  /// kSameColours: for the scalar that is shown; a colour map that the user has chosen stays.
+  enum class For { kScalar, kOpacities, kSameScalar, kSameColours, kFaces };
+  static constexpr size_t kPurposes = 5;
   struct Question {
     For what = For::kScalar;
     std::string scalar;
@@ -76,7 +78,7 @@ class FunctionChooser {
 
   const CacheReader& cache_;
   void (*const wake_)();
-  std::array<std::optional<std::string>, 4>
+  std::array<std::optional<std::string>, kPurposes>
       wanted_;         // for each purpose, the scalar of the answer that is to come
   Question question_;  // that is being answered
   std::future<EditedFunction> answering_;

@@ -72,6 +72,7 @@ AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, 
   AnnotatedScene scene{picture,          frame.view,       functions.bars(),
                        frame.data.lower, frame.data.upper, state.background()};
   scene.text_size = state.annotations.text_size;
+  scene.title = state.title;
   showOnGlobe(box, scene);
   return scene;
 }

@@ -163,6 +163,13 @@ std::string number(double value) {
   return fmt::format("{}", value == 0 ? 0 : roundedTo(value, std::abs(value), kDigits));
 }
 
+/// A title as --title takes it, in which braces begin and end fields.
+std::string withoutFields(const std::string& title) {
+  std::string text;
+  for (const char c : title) text.append(c == '{' || c == '}' ? 2 : 1, c);
+  return text;
+}
+
 class CommandLine {
  public:
   explicit CommandLine(std::string begin) : text_(std::move(begin)) {}
@@ -356,6 +363,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   if (state.annotations.axes) words.add("--axes");
   if (state.annotations.axes_grid) words.add("--axes-grid");
   if (state.annotations.outline) words.add("--outline");
+  if (!state.title.empty()) words.add("--title", withoutFields(state.title));
   if (state.annotations.text_size > 0) words.add("--text-size", number(state.annotations.text_size));
   return words.text();
 }

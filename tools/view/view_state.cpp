@@ -448,6 +448,15 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   return options;
 }
 
+void ViewState::setTitle(std::string text) {
+  size_t length = std::min(text.size(), kLongestTitle);
+  const auto continuesLetter = [&](size_t at) { return at < text.size() && (text[at] & 0xc0) == 0x80; };
+  while (length > 0 && continuesLetter(length)) --length;
+  text.resize(length);
+  title = std::move(text);
+  annotations.texts = !title.empty();
+}
+
 void ViewState::suitBackground() {
   function.suitBackground(dark);
   if (faces_by) faces_by->function.suitBackground(dark);
@@ -524,6 +533,7 @@ std::string toJson(const ViewState& state) {
   json["axes"] = state.annotations.axes;
   json["axes_grid"] = state.annotations.axes_grid;
   json["outline"] = state.annotations.outline;
+  json["title"] = state.title;
   json["markers"] = Json::array();
   for (const Marker& marker : state.markers) json["markers"].push_back(jsonOf(marker));
   return json.dump(1) + "\n";
@@ -568,6 +578,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   state.dark = fields.at("dark").flag();
   state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};
   if (const auto grid = fields.find("axes_grid")) state.annotations.axes_grid = grid->flag();
+  if (const auto title = fields.find("title")) state.setTitle(title->text());
   const double unit = defaultOpacityUnit(manifest, factors);
   if (const auto opacity = fields.find("opacity_by"))
     state.opacity_by = opacityScalarFrom(*opacity, path, manifest, unit);

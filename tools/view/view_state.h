@@ -123,11 +123,15 @@ struct ViewState {
   std::vector<OpacityPoint> gradient_opacity = {};           // FrameOptions'
   bool dark = true;                                          // background
   Annotations annotations{.scalar_bar = true, .axes = true};
+  std::string title = {};  // above the data, as it is; set by setTitle()
   std::optional<OpacityScalar> opacity_by = std::nullopt;
   std::optional<OpacitiesBefore> opacities_before = std::nullopt;
   std::vector<Marker> markers = {};
   std::shared_ptr<const GivenSheets> given = nullptr;
 
+  /// Sets the title above the data, in UTF-8; cuts one of more than kLongestTitle bytes.
+  void setTitle(std::string text);
+  static constexpr size_t kLongestTitle = 200;
   glm::vec4 background() const { return dark ? kDefaultBackground : glm::vec4(1); }
   /// Suits all functions to the background (EditedFunction::suitBackground()).
   void suitBackground();

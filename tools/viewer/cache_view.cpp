@@ -386,8 +386,11 @@ void CacheView::apply(const PanelActions& actions) {
   if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
   if (actions.draw_isosurfaces_of) drawIsosurfacesOf(*actions.draw_isosurfaces_of);
   if (actions.automatic_function) run(Command::kResetFunction);
-  if (actions.automatic_opacities && state_.opacity_by)
-    chooser_.ask({FunctionChooser::For::kOpacities, state_.opacity_by->variable});
+  if (actions.automatic_opacities)
+    chooser_.ask(
+        state_.opacity_by
+            ? FunctionChooser::Question{FunctionChooser::For::kOpacities, state_.opacity_by->variable}
+            : FunctionChooser::Question{FunctionChooser::For::kSameColours, state_.variable});
   if (actions.add_faces) addFaces(*actions.add_faces);
   // What is saved has no tint.
   const bool tints = !save_to_ && !actions.add_faces && !not_tinted_.contains(actions.pointed_faces);

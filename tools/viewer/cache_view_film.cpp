@@ -91,6 +91,7 @@ void CacheView::showFilm(bool whole_function) {
   state_ = stateOfFilm();
   chooser_.drop(FunctionChooser::For::kScalar);
   chooser_.drop(FunctionChooser::For::kSameScalar);
+  chooser_.drop(FunctionChooser::For::kSameColours);
   show(*film, film_.time(), state_);
   takeBars();
   if (const auto at = positionOf(*film, film_.time(), cache_.series(), playback_.interpolates()))

@@ -538,6 +538,9 @@ void CacheView::takeFunction() {
     case FunctionChooser::For::kSameScalar:
       if (question.scalar == state_.variable) state_.function = function;
       break;
+    case FunctionChooser::For::kSameColours:
+      if (question.scalar == state_.variable) state_.function = chosenAnew(state_.function, function);
+      break;
   }
   state_.suitBackground();
   ++function_version_;

@@ -383,6 +383,7 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
       return std::nullopt;
     }
     chosen.files.push_back(path);
+    if (fs::is_directory(path.parent_path(), ignored)) folder_ = path.parent_path();  // offered the next time
     if (*purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie) chosen.size = size_;
     if (*purpose_ == Purpose::kSaveMovie) chosen.frames_per_s = movie_.frames_per_s;
     return chosen;
