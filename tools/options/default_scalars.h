@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-/// So many scalars are converted where none are named.
+/// The most scalars that are converted where none are named.
 inline constexpr size_t kMaxDefaultScalars = 16;
 
 /// The scalars that the files store and that can share a cache, each name once and kMaxDefaultScalars at most: positions in description.scalars, in their
