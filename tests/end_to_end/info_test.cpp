@@ -289,7 +289,7 @@ TEST_F(InfoOfACache, StepsThatAreTooWideAreWarnedOf) {
       const bool warned = picture.err.find("its stored values, ") != std::string::npos;
       EXPECT_EQ(warned, precision == "normal") << picture.err;
       if (!warned) continue;
-      expectSays(picture.err, "convert again, with --value-precision auto or fine");
+      expectSays(picture.err, "convert again with --value-precision auto or fine");
       if (asked.back() == "0.5,0.3") expectSays(picture.err, "the linear part of asinh");
     }
   }

@@ -5,8 +5,10 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -147,9 +149,20 @@ class WindowTest : public ProgramSuite<WindowTest> {
     press("ctrl+c");
     return save();
   }
+  bool hasEnded() const {
+    siginfo_t info{};
+    const auto process = static_cast<id_t>(window_->process());
+    return ::waitid(P_PID, process, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid != 0;
+  }
   /// Closes the window: the words of the commands that were copied, without the program's name.
   std::vector<Words> close() {
-    press("ctrl+q");
+    // A key that comes in the frame in which a dialog closes is the dialog's.
+    const bool has_ended = eventually([&] {
+      if (!hasEnded()) press("ctrl+q");
+      return eventually([&] { return hasEnded(); }, 10);
+    });
+    EXPECT_TRUE(has_ended);
+    if (!has_ended) window_->signal(SIGKILL);
     const ProgramResult result = window_->wait();
     EXPECT_EQ(result.status, 0) << result.err;
     std::vector<Words> commands;

@@ -583,6 +583,7 @@ TEST_F(WindowPanels, ThePictureDialogOffersItsLastFolder) {
   click("Save picture as...");
   EXPECT_TRUE(eventually([] { return hasWidget("file one.png"); }));
   press("Escape");
+  EXPECT_TRUE(eventually([] { return !hasWidget("file name"); }));
   close();
 }
 

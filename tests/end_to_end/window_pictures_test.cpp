@@ -339,12 +339,12 @@ TEST_F(WindowMovie, AFilmIsMadePlayedSavedAndDrawnAsRenderDrawsIt) {
   click("delete key frame");
   EXPECT_TRUE(eventually([] { return !hasWidget("key frame 1"); }));
   click("open film");
-  answer("movie/film.json");
+  answer("film.json");  // in the folder that was typed
   placeOf("key frame 2 drawn");
   EXPECT_GE(difference(save(), first), 50);
 
   click("Save film: key frames...");
-  answer("movie/m.png");
+  answer("m.png");
   const auto is_written = [] { return fs::exists("movie/m_0005.png") && !hasWidget("stop movie"); };
   EXPECT_TRUE(eventually(is_written, 300));
   click("Copy command for the key frames");
