@@ -95,8 +95,8 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description) {
       std::ranges::all_of(description.blocks, isFlat))
     throw NothingToDraw(
         "{}: the grid is flat: its {} nodes lie in blocks of a single plane, which have no volume; no value "
-        "of the "
-        "chosen scalars is finite there, and there is nothing to draw",
+        "of "
+        "the chosen scalars is finite there, and there is nothing to draw",
         file, survey.nodes);
   if (all_blanked)
     throw NothingToDraw(

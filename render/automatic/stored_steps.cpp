@@ -70,9 +70,9 @@ std::vector<std::string> isovaluesFinerThanStored(const CacheReader& cache, cons
     const double share = histogram->shareBelow(value + step) - histogram->shareBelow(value - step);
     if (share > kLargestShare)
       warnings.push_back(fmt::format(
-          "isovalue {} of {}: {:.0f} % of the volume lie within a step of its stored values, "
-          "{:.2g}, where the surface "
-          "follows their rounding; {}",
+          "isovalue {} of {}: {:.0f} % of the volume lie within a step of its stored values, {:.2g}, where "
+          "the "
+          "surface follows their rounding; {}",
           text, name, 100 * share, step, remedy(cache, variable, {value, value}, step, coding.spread)));
     else if (step > kWidestStep * coding.spread.scaleAt(value) && coding.spread.scale > 0)
       warnings.push_back(fmt::format(

@@ -29,12 +29,13 @@ struct AskedDifferences {
   bool operator==(const AskedDifferences&) const = default;
 };
 
-/// A warning if an axis has fewer than 100 steps of the stored values, or fewer than 20 within the width around the centre of an asinh, or
+/// Returns a warning if an axis has fewer than 100 steps of the stored values, or fewer than 20 within the width around the centre of an asinh, or
 /// in the first decade of a logarithm; empty otherwise.
 std::string axisFinerThanStored(const CacheReader& cache, const ShownAxis& shown);
 
-/// The same of each axis, of one scalar once; and a warning for each isovalue from which more than 2 % of the volume lies no further than a
-/// step, where its surface follows the values' rounding, or where steps are wider than 5 % of its own scale (ValueSpread).
+/// Returns what axisFinerThanStored() says of the axes, for each scalar once, and a warning for each isovalue from which more than 2 % of
+/// the volume lies no further than a step, where its surface follows the values' rounding, or where steps are wider than 5 % of its own
+/// scale (ValueSpread).
 std::vector<std::string> finerThanStored(const CacheReader& cache, const AskedDifferences& asked);
 
 }  // namespace curvisplat

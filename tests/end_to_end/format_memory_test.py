@@ -326,10 +326,12 @@ class LongRows(FormatMemory):
         return self.WHOLE[nodes]
 
     def files_of(self, cache):
-        """Its files; of the manifest, which names the grid's files, what is measured."""
+        """Its files; the manifest without what names the grid's files and their format."""
         files = {path.name: path.read_bytes() for path in cache.iterdir()}
         manifest = json.loads(files["manifest.json"])
-        files["manifest.json"] = [manifest[key] for key in ("lower", "upper", "nodes", "blanked_nodes", "splats", "levels", "volume")]
+        for variable in manifest["variables"]:
+            del variable["name"]
+        files["manifest.json"] = {key: manifest[key] for key in manifest.keys() - {"title", "sources", "reader", "blocks", "checksum"}}
         return files
 
     def expect_within(self, what, *paths, scalar="p"):

@@ -198,10 +198,10 @@ void render(const RenderArguments& given) {
          curvesThatMiss(arguments.surfaces, *options.scene, manifest.lower, manifest.upper))
       printMessage("warning: {}", miss);
   const bool of_colours = isoOfColours(arguments.opacity, arguments.scalar);
+  std::vector<ShownAxis> axes{{variable, transfer_function.axis()}};
+  if (scalars.colour) axes.push_back({shown, colours.axis()});
   for (const std::string& finer :
-       finerThanStored(cache, {{{variable, transfer_function.axis()}, {shown, colours.axis()}},
-                               of_colours ? shown : variable,
-                               arguments.surfaces.isovalues}))
+       finerThanStored(cache, {axes, of_colours ? shown : variable, arguments.surfaces.isovalues}))
     printMessage("warning: {}", finer);
 
   const ImageSize picture = options.size;

@@ -14,10 +14,10 @@ namespace curvisplat {
 /// The most scalars that are converted where none are named.
 inline constexpr size_t kMaxDefaultScalars = 16;
 
-/// The scalars that the files store and that can share a cache, each name once and kMaxDefaultScalars at most: positions in description.scalars, in their
-/// order. They have the centring of the first one, unless quantities that flow solvers compute are there in the other alone. Beyond that number,
-/// components are left out before scalars, those of tensors first. Prints notes that name what is left out, and how to choose it.
-/// Those of `unusable` are not chosen.
+/// The scalars that the files store and that can share a cache, each name once and kMaxDefaultScalars at most: positions in
+/// description.scalars, in their order. They have the centring of the first one, unless quantities that flow solvers compute are there in
+/// the other alone. Beyond that number, components are left out before scalars, those of tensors first. Prints notes that name what is left
+/// out, and how to choose it. Those of `unusable` are not chosen.
 std::vector<uint32_t> defaultScalars(const GridDescription& description,
                                      const std::set<std::string>& unusable = {});
 

@@ -12,6 +12,7 @@
 #include <optional>
 #include <set>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "preprocess/addition/convert_series.h"
@@ -230,50 +231,49 @@ std::string namesIn(const GridDescription& description, const std::vector<uint32
   return listed(names);
 }
 
-/// Stored scalars of the centring that are not among `converted`; of those of one name, the first.
-std::vector<uint32_t> othersOf(const GridDescription& description, Centring centring,
-                               const std::vector<uint32_t>& converted) {
-  std::vector<uint32_t> others;
-  std::set<std::string> names;
-  for (uint32_t n = 0; n < description.scalars.size(); ++n) {
-    const GridScalar& scalar = description.scalars[n];
-    if (!scalar.derived && scalar.centring == centring && names.insert(scalar.name).second &&
-        std::ranges::count(converted, n) == 0)
-      others.push_back(n);
+/// Returns the stored scalars that are not among `converted`, as many at a time as are converted unasked: those of its centring first,
+/// and the first of each name.
+std::vector<std::vector<uint32_t>> othersThan(const GridDescription& description,
+                                              const std::vector<uint32_t>& converted) {
+  const Centring centring = description.scalars[converted.front()].centring;
+  std::vector<std::vector<uint32_t>> others;
+  for (const bool is_same : {true, false}) {
+    std::vector<uint32_t> some;
+    std::set<std::string> names;
+    for (uint32_t n = 0; n < description.scalars.size(); ++n) {
+      const GridScalar& scalar = description.scalars[n];
+      if (scalar.derived || (scalar.centring == centring) != is_same || !names.insert(scalar.name).second ||
+          std::ranges::count(converted, n) > 0)
+        continue;
+      some.push_back(n);
+      if (some.size() == kMaxDefaultScalars) others.push_back(std::exchange(some, {}));
+    }
+    if (!some.empty()) others.push_back(std::move(some));
   }
   return others;
 }
 
-/// Converts the scalars of `options`. If they are all constant and none is wanted, it converts the first others that are not instead, as
-/// many at a time as are converted unasked, and those of the other centring last.
+/// Converts the scalars of `options`; if they are all constant and none is wanted, the first others that are not.
 ConvertReport convertVarying(const DataSource& source, const ConvertOptions& options,
                              const std::vector<std::string>& wanted, Progress& progress) {
   const ConvertReport first = convertNarrow(source, options, wanted, progress);
-  const GridDescription& description = source.description();
   if (!std::ranges::all_of(wanted, &std::string::empty) || options.scalars.empty() ||
       !isConstant(options.output))
     return first;
-  const Centring centring = description.scalars[options.scalars.front()].centring;
-  const Centring other = centring == Centring::kNode ? Centring::kCell : Centring::kNode;
-  bool is_replaced = false;
-  for (const Centring of : {centring, other}) {
-    const std::vector<uint32_t> left = othersOf(description, of, options.scalars);
-    for (size_t begin = 0; begin < left.size(); begin += kMaxDefaultScalars) {
-      ConvertOptions others = options;
-      const size_t end = std::min(left.size(), begin + kMaxDefaultScalars);
-      others.scalars.assign(left.begin() + static_cast<ptrdiff_t>(begin),
-                            left.begin() + static_cast<ptrdiff_t>(end));
-      ConvertReport report = convertNarrow(source, others, wanted, progress);
-      is_replaced = true;
-      if (isConstant(options.output)) continue;
-      report.notes.push_back(
-          fmt::format("{} {} constant, so {} took {} place", namesIn(description, options.scalars),
-                      options.scalars.size() == 1 ? "is" : "are", namesIn(description, others.scalars),
-                      options.scalars.size() == 1 ? "its" : "their"));
-      return report;
-    }
+  const GridDescription& description = source.description();
+  const std::vector<std::vector<uint32_t>> choices = othersThan(description, options.scalars);
+  for (const std::vector<uint32_t>& scalars : choices) {
+    ConvertOptions others = options;
+    others.scalars = scalars;
+    ConvertReport report = convertNarrow(source, others, wanted, progress);
+    if (isConstant(options.output)) continue;
+    const bool is_one = options.scalars.size() == 1;
+    report.notes.push_back(fmt::format("{} {} constant, so {} took {} place",
+                                       namesIn(description, options.scalars), is_one ? "is" : "are",
+                                       namesIn(description, scalars), is_one ? "its" : "their"));
+    return report;
   }
-  return is_replaced ? convertNarrow(source, options, wanted, progress) : first;
+  return choices.empty() ? first : convertNarrow(source, options, wanted, progress);
 }
 
 /// Says which of the time steps is converted, and how all of them are.

@@ -73,8 +73,8 @@ inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
 /// stays in the folder of its preview, and `output` links to it. Previews of a series show its first step: a
 /// coarse one if the step is large, then the step as converted. If the files hold a grid alone, those of `scalars` that can be computed
 /// from it are converted; other names are passed over. Files with several time steps give the first, or the last if all scalars
-/// of the first are constant; where the default scalars are constant, others take their place. Throws Error as opening and converting do, LoneGrid if none can,
-/// Interrupted once `progress` is stopped.
+/// of the first are constant; where the default scalars are constant, others take their place. Throws Error as
+/// opening and converting do, LoneGrid if none can, Interrupted once `progress` is stopped.
 void makeKeptCache(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output,
                    Progress& progress, const KeptCacheEvents& events, const std::vector<std::string>& scalars,
                    ValuePrecision precision);
