@@ -595,6 +595,7 @@ TEST_F(WindowPanels, ATitleStandsAboveTheDataAndInTheCommand) {
   click("title");
   act({"type", "Flow {1}"});
   press("Return");
+  save();
   const Image with = saveAndCopy();
   EXPECT_LT(difference(without, with), 60);
   const auto command = close().at(0);
