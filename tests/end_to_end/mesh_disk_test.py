@@ -43,6 +43,18 @@ class MeshDisk(FormatCase):
                     self.assertGreater(guess["cache_bytes"] / truth["cache_bytes"], 0.5)
                     self.assertLess(guess["cache_bytes"] / truth["cache_bytes"], 1.5)
 
+    def test_a_series_is_estimated_from_its_first_step(self):
+        path = self.mesh("--size", "36", "--tetrahedra")
+        steps = [path.rename(self.folder / "mesh.0.vtu"), path.with_name("mesh.1.vtu")]
+        steps[1].write_bytes(steps[0].read_bytes())
+        out = self.folder / "stats.json"
+        self.convert(steps, "f", "--dry-run", "--stats", out)
+        guess = json.loads(out.read_text())["dry_run"]
+        self.assertEqual(guess["steps"], 2)
+        cache = sum(file.stat().st_size for file in self.convert(steps, "f").rglob("*") if file.is_file())
+        self.assertGreater(guess["cache_bytes"] / cache, 0.6)
+        self.assertLess(guess["cache_bytes"] / cache, 1.6)
+
     def on_a_disk(self, megabytes, path, scalar, *options):
         """Of a conversion to a disk of that size; skips the test where none can be mounted."""
         disk = self.folder / "disk"

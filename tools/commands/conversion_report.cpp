@@ -61,8 +61,8 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
     fmt::print("{} samples{}; estimated from {} of them, converted in {}:\n", forecast.samples, of_steps,
                forecast.sampled, estimatedTime(forecast.sampling_seconds));
   else
-    fmt::print("{} samples; estimated from its cells, and from conversions of other unstructured grids:\n",
-               forecast.samples);
+    fmt::print("{} samples{}; estimated from its cells, and from conversions of other unstructured grids:\n",
+               forecast.samples, of_steps);
   const double each = static_cast<double>(forecast.cache_bytes) / samples;
   printLine("  cache      {} in {}{}, {} bytes per sample{}", size(forecast.cache_bytes), output.string(),
             freeText(output),
@@ -111,7 +111,8 @@ void useOwnPeak(Forecast& forecast, const GridDescription& whole, const GridDesc
   if (nodesOf(whole) == nodesOf(sample)) forecast.memory_bytes = ProcessUsage::now().peak_memory_bytes;
 }
 
-Forecast forecastOfMesh(const MeshSource& mesh, const ConvertOptions& options) {
+/// Of `steps` time steps, whose points and cells are those of the first: each adds values alone.
+Forecast forecastOfMesh(const MeshSource& mesh, const ConvertOptions& options, uint64_t steps) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   Forecast forecast;
   Progress progress{progressBar()};
@@ -126,11 +127,12 @@ Forecast forecastOfMesh(const MeshSource& mesh, const ConvertOptions& options) {
       estimateConversion(splats, plan.threads,
                          origin.centring() == Centring::kCell ? SplatsOf::kMeshCells : SplatsOf::kMeshPoints);
   const DiskNeeds needs = with(temporary, diskNeeds(splats, options.scalars.size()));
+  forecast.steps = steps;
   forecast.cache_bytes =
-      estimate.cache_bytes + (options.scalars.size() - 1) * estimate.bytes_per_further_scalar;
+      estimate.cache_bytes + (steps * options.scalars.size() - 1) * estimate.bytes_per_further_scalar;
   forecast.temporary_bytes = needs.mostTemporary();
   forecast.memory_bytes = plan.expectedPeak(splats, options.scalars.size());
-  forecast.seconds = estimate.seconds;
+  forecast.seconds = static_cast<double>(steps) * estimate.seconds;
   return forecast;
 }
 
@@ -141,7 +143,7 @@ void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
   checkOutput(options.output, options.overwrite || options.resume, temporaryFolderOf(options));
   const GridDescription whole = source->description();
   if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get()))
-    return finish(forecastOfMesh(*mesh, options), options, arguments);
+    return finish(forecastOfMesh(*mesh, options, 1), options, arguments);
   checkPlanes(whole, options.planes);
   const std::unique_ptr<GridSource> sample =
       sampleOf(std::unique_ptr<GridSource>(dynamic_cast<GridSource*>(source.release())), kSampledNodes);
@@ -165,6 +167,12 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   checkOutput(options.convert.output, options.convert.overwrite || options.convert.resume,
               temporaryFolderOf(options.convert));
   requireThreads(options.convert.threads);
+  const std::unique_ptr<DataSource> first = input.open(0);
+  ConvertOptions with_scalars = options.convert;
+  with_scalars.scalars = input.scalars(first->description());
+  if (const auto* const mesh = dynamic_cast<const MeshSource*>(first.get()))
+    return finish(forecastOfMesh(*mesh, with_scalars, input.count), options.convert, arguments);
+
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const ScratchFolder folder(ScratchFolder::newPath(temporaryFolderOf(options.convert), "dry-run"),
@@ -175,16 +183,11 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   SeriesInput sample = input;
   sample.count = std::min<uint64_t>(2, input.count);
   sample.open = [&](uint64_t step) {
-    std::unique_ptr<GridSource> grid =
-        requireGrid(input.open(step), "is not sampled in series; take --dry-run of one step (--time-step)");
+    std::unique_ptr<GridSource> grid = requireGrid(input.open(step), "cannot follow a structured step");
     whole = grid->description();
     grid = sampleOf(std::move(grid), kSampledNodes);
     part = grid->description();
     return grid;
-  };
-  ConvertOptions with_scalars = options.convert;
-  sample.scalars = [&](const GridDescription& description) {
-    return with_scalars.scalars = input.scalars(description);
   };
 
   Forecast forecast;
