@@ -41,6 +41,7 @@ class WindowTest : public ProgramSuite<WindowTest> {
   }
   static void TearDownTestSuite() {
     std::filesystem::current_path(old_folder_);
+    unsetenv("MESA_SHADER_CACHE_DIR");  // of KeptCaches
     ProgramSuite::TearDownTestSuite();
   }
   void SetUp() override {
