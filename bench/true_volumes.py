@@ -42,19 +42,29 @@ def cell_corners(xyz):
     return np.stack([xyz[n[c & 1], n[c >> 1 & 1], n[c >> 2]].reshape(-1, 3) for c in range(8)], axis=1)
 
 
-def trilinear(corners, u, v, w):
-    """Positions (or values) and the Jacobian's determinant (of positions)."""
-    def shape(c):
-        return (u if c & 1 else 1 - u) * (v if c & 2 else 1 - v) * (w if c & 4 else 1 - w)
-    return sum(shape(c) * corners[:, c] for c in range(8))
+def coefficients(corners):
+    """[term, component, cell] of trilinear cells: the term of u has bit 1, of v bit 2, of w bit 4."""
+    terms = np.moveaxis(corners, 0, -1).copy()
+    for bit in (1, 2, 4):
+        for c in range(8):
+            if c & bit:
+                terms[c] -= terms[c ^ bit]
+    return terms
 
 
-def determinant(corners, u, v, w):
-    c = corners
-    x_u = ((1 - v) * (1 - w))*(c[:, 1] - c[:, 0]) + (v * (1 - w))*(c[:, 3] - c[:, 2]) + ((1 - v) * w)*(c[:, 5] - c[:, 4]) + v * w * (c[:, 7] - c[:, 6])
-    x_v = ((1 - u) * (1 - w))*(c[:, 2] - c[:, 0]) + (u * (1 - w))*(c[:, 3] - c[:, 1]) + ((1 - u) * w)*(c[:, 6] - c[:, 4]) + u * w * (c[:, 7] - c[:, 5])
-    x_w = ((1 - u) * (1 - v))*(c[:, 4] - c[:, 0]) + (u * (1 - v))*(c[:, 5] - c[:, 1]) + ((1 - u) * v)*(c[:, 6] - c[:, 2]) + u * v * (c[:, 7] - c[:, 3])
-    return np.abs(np.einsum("ni,ni->n", x_u, np.cross(x_v, x_w)))
+def trilinear(terms, u, v, w):
+    """[component, cell]."""
+    _1, _u, _v, _uv, _w, _uw, _vw, _uvw = terms
+    return _1 + u * (_u + v * (_uv + w * _uvw) + w * _uw) + v * (_v + w * _vw) + w * _w
+
+
+def determinant(terms, u, v, w):
+    """The Jacobian's, without its sign."""
+    _, _u, _v, _uv, _w, _uw, _vw, _uvw = terms
+    x_u = _u + v * (_uv + w * _uvw) + w * _uw
+    x_v = _v + u * (_uv + w * _uvw) + w * _vw
+    x_w = _w + u * (_uw + v * _uvw) + v * _vw
+    return np.abs(sum(x_u[n] * (x_v[n - 2] * x_w[n - 1] - x_v[n - 1] * x_w[n - 2]) for n in range(3)))
 
 
 def drawn_cells(xyz, values):
@@ -74,11 +84,12 @@ def volumes(blocks, threshold, points):
     whole = above = 0.0
     for xyz, values in blocks:
         corners, f, of_nodes = drawn_cells(xyz, values)
+        terms, terms_of_f = coefficients(corners), coefficients(f) if of_nodes else None
         for u, a in zip(at, weight):
             for v, b in zip(at, weight):
                 for w, c in zip(at, weight):
-                    part = a * b * c * determinant(corners, u, v, w)
-                    here = trilinear(f, u, v, w)[:, 0] if of_nodes else f[:, 0, 0]
+                    part = a * b * c * determinant(terms, u, v, w)
+                    here = trilinear(terms_of_f, u, v, w)[0] if of_nodes else f[:, 0, 0]
                     whole += part.sum()
                     above += part[here > threshold].sum()
     return whole, above
@@ -97,17 +108,17 @@ def depths_of(blocks, middle, scale, points):
     are those of a sequence of low discrepancy, so that none line up with squares."""
     count = PIXELS // BLOCK
     sums = {view: np.zeros(count * count) for view in VIEWS}
+    to_squares = np.concatenate([axes_of(view)[:2] for view in VIEWS]) * count / (2 * scale)
     cells_of_blocks = [drawn_cells(xyz, values)[0] for xyz, values in blocks]
     per_cell = max(64, -(-points // sum(len(corners) for corners in cells_of_blocks)))
     for corners in cells_of_blocks:
+        terms = coefficients(corners)
         first = np.arange(len(corners)) * float(per_cell)
         for n in range(per_cell):
-            u, v, w = (((first + n) * 1.2207440846057596 ** -axis % 1)[:, None] for axis in (1, 2, 3))
-            part = determinant(corners, u, v, w) / per_cell
-            here = trilinear(corners, u, v, w) - middle
-            for view in VIEWS:
-                right, up, _ = axes_of(view)
-                x, y = (((here @ axis / scale + 1) / 2 * count).astype(int) for axis in (right, up))
+            u, v, w = ((first + n) * 1.2207440846057596 ** -axis % 1 for axis in (1, 2, 3))
+            part = determinant(terms, u, v, w) / per_cell
+            places = (to_squares @ (trilinear(terms, u, v, w) - middle[:, None]) + count / 2).astype(int)
+            for view, x, y in zip(VIEWS, places[::2], places[1::2]):
                 sums[view] += np.bincount(y * count + x, weights=part, minlength=count * count)
     return {view: of_view.reshape(count, count) for view, of_view in sums.items()}
 

@@ -54,7 +54,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryScene,
                                          BackendScene{"ocean", {}}, BackendScene{"boundary-layer", {}}));
 
 TEST_P(EveryScene, IsTheSameByOpenGlAndByTheProcessor) {
-  run(Words{"generate", GetParam().scene, "--size", "32x20x20", "-o", file("a")} + GetParam().options);
+  run(Words{"generate", GetParam().scene, "--size", "24x14x12", "-o", file("a")} + GetParam().options);
   run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
   const std::vector<Words> views{
       {}, {"--view", "-z"}, {"--view", "+x"}, {"--view-angle", "60"}, {"--lod-pixels", "8"}};
@@ -78,7 +78,7 @@ TEST_P(EveryScene, IsTheSameByOpenGlAndByTheProcessor) {
 const Words kAround[] = {
     {"--surface", "kmin,jmax"},
     {"--surface", "kmin,jmax", "--surface-opacity", "0.4"},
-    {"--surface", "kmin", "--surface-by", "f", "--surface-opacity", "function"},
+    {"--surface", "kmin,kmax", "--surface-by", "f", "--surface-opacity", "function"},
     {"--surface", "sheet.obj"},
     {"--slice=2,0,2,1,0.3,0.2", "--slice=2,0,2,0,0.4,1"},
     {"--slice=2,0,2,0.3,1,0.2", "--slice-opacity", "0.5"},
@@ -99,7 +99,7 @@ class DrawnWake : public ProgramTest {
     Words words =
         optionsOf(backend) + Words{"--range", "0,1", "--view", "iso", "--background", "white"} + view;
     for (const std::string& option : more) words.push_back(option == "sheet.obj" ? file(option) : option);
-    return pictureOf(file("wake.splats"), file("a.pfm"), words, "160x120");
+    return pictureOf(file("wake.splats"), file("a.pfm"), words, "100x75");
   }
 };
 
@@ -112,7 +112,7 @@ class AroundBackends : public DrawnWake, public testing::WithParamInterface<std:
       if (backend.at("name") == (GetParam() == "card" ? "egl" : GetParam()) &&
           !backend.at("works").get<bool>())
         GTEST_SKIP() << backend.dump();
-    madeCache(file("wake"), "wake", "36x24x18", {"--scalar", "f,jacobian"});
+    madeCache(file("wake"), "wake", "24x16x12", {"--scalar", "f,jacobian"});
     std::ofstream(file("sheet.obj")) << "v -3 -2 1\nv 6 -2 2.5\nv 6 2 3\nv -3 2 1.5\nf 1 2 3 4\n";
   }
 };

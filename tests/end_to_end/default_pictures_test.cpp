@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <ostream>
 #include <sstream>
@@ -33,8 +34,16 @@ constexpr std::string_view kChosen = "chosen from the data: ";
 class DefaultPictures : public ProgramTest, public testing::WithParamInterface<const char*> {
  protected:
   void convert(const std::string& scene, const std::string& size) const { madeCache(file("a"), scene, size); }
+  /// The scene's cache, converted for the first test of it.
+  static const std::string& sharedCacheOf(const std::string& scene) {
+    static const TemporaryFolder folder;
+    static std::map<std::string, std::string> caches;
+    const auto [place, is_new] = caches.try_emplace(scene);
+    if (is_new) place->second = madeCache((folder / scene).string(), scene, "48x32x24");
+    return place->second;
+  }
   ProgramResult render(const Words& options, const std::string& name = "a.png") const {
-    return run(Words{"render", file("a.splats"), "-o", file(name), "--size", "160x160"} + options);
+    return run(Words{"render", cache_, "-o", file(name), "--size", "160x160"} + options);
   }
   static Words chosenOptions(const std::string& out) {
     const size_t at = out.find(kChosen);
@@ -45,10 +54,12 @@ class DefaultPictures : public ProgramTest, public testing::WithParamInterface<c
     for (std::string word; words >> word;) options.push_back(word);
     return options;
   }
+
+  std::string cache_ = file("a.splats");
 };
 
 TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
-  convert(GetParam(), "48x32x24");
+  cache_ = sharedCacheOf(GetParam());
   const ProgramResult result = render({});
   EXPECT_EQ(result.err, "");
   const PictureContrast contrast = contrastOf(readImage(file("a.png")), kDefaultBackground);
@@ -66,7 +77,7 @@ TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
 /// without.
 TEST_P(DefaultPictures, HoldTheWholeData) {
   constexpr int kTouchedZoomed = 6;  // of 640 pixels along the edges
-  convert(GetParam(), "48x32x24");
+  cache_ = sharedCacheOf(GetParam());
   const auto touched = [](const Image& image) {
     int number = 0;
     const auto count = [&](int x, int y) {
@@ -91,7 +102,7 @@ TEST_P(DefaultPictures, HoldTheWholeData) {
         if (!faults::isTried(combination++, 5)) continue;
         Words words{"--size", size, "--scale", stretched, "--backend", "cpu", "--background", "white"};
         if (outline) words.push_back("--outline");
-        words.insert(words.begin(), {"render", file("a.splats"), "-o", file("a.png")});
+        words.insert(words.begin(), {"render", cache_, "-o", file("a.png")});
         const ProgramResult result = run(words);
         // What is zoomed to leaves a hundredth of the extinction out on each side.
         const int may_touch = result.out.find("--focal-point") == std::string::npos ? 0 : kTouchedZoomed;

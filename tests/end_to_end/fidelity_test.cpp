@@ -109,6 +109,8 @@ class Fidelity : public ProgramSuite<Fidelity> {
     constexpr double kLayersDb = 0.3, kUnseenDb = 60;
     double coarser_db = least_of_root_db;
     for (const char* lod_pixels : {"1000", "8", "4", "2", "0"}) {
+      if ((lod_pixels == std::string("4") || lod_pixels == std::string("2")) && !faults::isWholeSweep())
+        continue;
       render("half-annulus", name, file(name + ".pfm"), {"--backend", "cpu", "--stats", file("stats.json")},
              lod_pixels);
       const auto stats = jsonOf(file("stats.json"))["frames"][0];
@@ -205,7 +207,7 @@ TEST_F(Fidelity, Step) {
 
 TEST_F(Fidelity, IsTheSameBytesForAnyThreadsAndAgain) {
   for (const std::string backend : {"osmesa", "cpu"}) {
-    const std::string lod_pixels = backend == "cpu" ? "0" : "16";
+    const std::string lod_pixels = backend == "cpu" ? "2" : "32";
     render("half-annulus", "smooth", file("one.exr"), {"--threads", "1", "--backend", backend}, lod_pixels);
     render("half-annulus", "smooth", file("two.exr"), {"--threads", "2", "--backend", backend}, lod_pixels);
     render("half-annulus", "smooth", file("again.exr"), {"--threads", "2", "--backend", backend}, lod_pixels);
@@ -284,6 +286,7 @@ TEST_F(CellFidelity, IsNearThatOfNodes) {
                    {"band", 67.5, 1.5},
                    {"step", 56, 1}};
   for (const auto& [name, least_db, most_lost_db] : functions) {
+    if (name == std::string("band") && !faults::isWholeSweep()) continue;
     const Image& reference = knownReference(name, kSize);
     const double nodes_db = compareImages(render("nodes.splats", name), reference).psnr_db;
     const double cells_db = compareImages(render("cells.splats", name), reference).psnr_db;

@@ -65,7 +65,7 @@ class SurfaceOptions : public ProgramSuite<SurfaceOptions> {
 
 TEST_F(SurfaceOptions, EveryPainterDrawsTheSame) {
   const std::string fine =
-      madeCache(file("fine"), "wake", "96x64x48");  // painters differ more in larger splats
+      madeCache(file("fine"), "wake", "72x48x36");  // painters differ more in larger splats
   std::string helix = "x,y,z\n";
   for (int n = 0; n < 200; ++n)
     helix += fmt::format("{},{},{}\n", 2 + 0.02 * n, 1.6 * std::sin(0.1 * n), 1.6 * std::cos(0.1 * n));

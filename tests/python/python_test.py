@@ -124,7 +124,7 @@ class Pictures(PythonTest):
 
     def test_of_two_scalars_are_the_commands(self):
         self.cache = self.folder / "two.splats"  # for expect_same()
-        curvisplat.convert(self.cache, self.folder / "wake.xyz", [self.folder / "wake.fun"], scalars=["f", "volume"])
+        curvisplat.convert(self.cache, self.folder / "wake.xyz", [self.folder / "wake.fun"], scalars=["f", "volume"], refine=1)
         with curvisplat.open(self.cache) as cache:
             two, one = (scalar.name for scalar in cache.scalars[:2])
             middle = (cache.scalars[0].min + cache.scalars[0].max) / 2
@@ -634,7 +634,7 @@ class Arrays(PythonTest):
 
     def test_with_long_rows_are_read_in_parts(self):
         """Rows that do not fit in a slab, of arrays and of a callable, to the bytes of whole rows."""
-        x, y, z, t = bent_duct(2, 2, 100_000)
+        x, y, z, t = bent_duct(2, 2, 64_000)
         blank = np.arange(t.size).reshape(t.shape) % 1013 == 5
         shortest = t.shape[2]
 
@@ -663,10 +663,10 @@ class Arrays(PythonTest):
         self.assertLess(shortest, t.shape[2])
 
     def test_of_a_callable_fit_in_memory_or_are_refused_with_a_sufficient_size(self):
-        """200,000 nodes along i: the peak of a process that makes no other arrays."""
+        """170,000 nodes along i: the peak of a process that makes no other arrays."""
         script = ("import curvisplat, numpy as np, os, re, sys\n"
                   "def peak(): return int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1]) >> 10\n"
-                  "ni = 200_000\n"
+                  "ni = 170_000\n"
                   "def piece(k0, k1, j0, j1, i0, i1, names):\n"
                   "    k, j, i = np.meshgrid(np.arange(k0, k1), np.arange(j0, j1), 1e-3 * np.arange(i0, i1), indexing='ij')\n"
                   "    k, j = k.astype('f8'), j.astype('f8')\n"

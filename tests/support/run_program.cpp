@@ -68,20 +68,22 @@ void drain(Pipe& out, std::string& out_text, Pipe& err, std::string& err_text) {
 }
 
 const std::string& mpirun() {
-  static const std::string found = [] {
-    const std::string path = std::getenv("PATH") ? std::getenv("PATH") : "";
-    for (size_t begin = 0; begin <= path.size();) {
-      const size_t end = std::min(path.find(':', begin), path.size());
-      const std::string candidate = path.substr(begin, end - begin) + "/mpirun";
-      if (::access(candidate.c_str(), X_OK) == 0) return candidate;
-      begin = end + 1;
-    }
-    return std::string();
-  }();
+  static const std::string found = pathOf("mpirun");
   return found;
 }
 
 }  // namespace
+
+std::string pathOf(const std::string& name) {
+  const std::string path = std::getenv("PATH") ? std::getenv("PATH") : "";
+  for (size_t begin = 0; begin <= path.size();) {
+    const size_t end = std::min(path.find(':', begin), path.size());
+    const std::string candidate = path.substr(begin, end - begin) + "/" + name;
+    if (::access(candidate.c_str(), X_OK) == 0) return candidate;
+    begin = end + 1;
+  }
+  return {};
+}
 
 struct RunningProgram::Pipes {
   Pipe out, err;
@@ -109,7 +111,7 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments, const 
   sigaddset(&answered, SIGINT);
   posix_spawnattr_setsigdefault(&attributes, &answered);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
-  const int failed = posix_spawn(&child_, program.c_str(), &actions, &attributes, argv.data(), environ);
+  const int failed = posix_spawnp(&child_, program.c_str(), &actions, &attributes, argv.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   require(failed == 0, failed, program.c_str());

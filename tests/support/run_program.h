@@ -20,7 +20,10 @@ struct ProgramResult {
 /// libraries (programs/run_by_fork.cpp), which takes a third of the time, unless CURVISPLAT_START is in the environment.
 ProgramResult runProgram(const std::vector<std::string>& arguments);
 
-/// A program on its way; one that no one waited for is killed.
+/// The file of a program that the shell would find by this name, on the path; "" if there is none.
+std::string pathOf(const std::string& name);
+
+/// A program on its way, found on the path unless its name has a slash; one that no one waited for is killed.
 class RunningProgram {
  public:
   explicit RunningProgram(const std::vector<std::string>& arguments,

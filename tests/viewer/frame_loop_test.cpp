@@ -30,7 +30,7 @@ class FrameLoopTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    convertGrid(SceneGridSource(makeScene("half-annulus"), {128, 64, 64}), *folder_ / "scene.splats");
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {96, 40, 32}), *folder_ / "scene.splats");
   }
   static void TearDownTestSuite() { folder_.reset(); }
 
@@ -115,7 +115,10 @@ TEST_F(FrameLoopTest, PicturesStayOnTheCardOfAWindowThatSharesIt) {
   } catch (const Error& error) {
     GTEST_SKIP() << error.what();
   }
-  FrameLoop loop(cache_, Backend::kEgl, waker(), {}, &*window);
+  // Small: OpenGL on the processor takes a second for ten thousand splats.
+  convertGrid(SceneGridSource(makeScene("half-annulus"), {32, 16, 12}), *folder_ / "small.splats");
+  const CacheReader small(*folder_ / "small.splats");
+  FrameLoop loop(small, Backend::kEgl, waker(), {}, &*window);
   FrameRequest request = requestOf();
   request.options.card_memory_bytes = 64 << 20;
   request.may_stay_on_card = request.moving = true;
@@ -389,7 +392,7 @@ class ClosingTest : public testing::TestWithParam<PagerOptions::Way> {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    convertGrid(SceneGridSource(makeScene("half-annulus"), {128, 64, 64}), *folder_ / "scene.splats");
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {96, 40, 32}), *folder_ / "scene.splats");
   }
   static void TearDownTestSuite() { folder_.reset(); }
 
