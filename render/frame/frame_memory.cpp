@@ -41,7 +41,7 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // Larger buffers do not make a frame faster: they only even out bricks that take different times.
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
-constexpr uint64_t kMaxWaitingBytes = 96 << 20;
+constexpr uint64_t kMaxWaitingBytes = 384 << 20;
 // The bytes of a waiting splat in the queues of tiles (render/tiles/tile_queues.h) and prepared.
 constexpr uint64_t kWaitingSplatBytes =
     sizeof(ScreenSplat) + sizeof(uint64_t) + PaintResources::kPreparedBytesASplat;

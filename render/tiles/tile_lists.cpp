@@ -122,13 +122,14 @@ void TileLists::begin(const TileCorner& tile) {
   staged_count_ = 0;
 }
 
-OrderTileMask TileLists::add(const ScreenSplat& splat, uint32_t number, OrderTileMask tiles, uint32_t front) {
+OrderTileMask TileLists::add(ScreenSplat& splat, uint32_t number, OrderTileMask tiles, uint32_t front) {
   constexpr float kHalf = 0.5f * kOrderSide;
   if (staged_.size() < staged_count_ + kOrderTiles) staged_.resize(2 * staged_.size() + kOrderTiles);
   const uint64_t index = order_.size();
   uint64_t* const begin = &staged_[staged_count_];
   uint64_t* end = begin;
   OrderTileMask behind = 0;
+  uint32_t least = UINT32_MAX;  // of the keys behind the front
   for (; tiles != 0; tiles &= tiles - 1) {
     const auto tile = static_cast<uint32_t>(std::countr_zero(tiles));
     const uint32_t key =
@@ -136,12 +137,14 @@ OrderTileMask TileLists::add(const ScreenSplat& splat, uint32_t number, OrderTil
               tile_.y + static_cast<float>(tile / kOrderTilesAlong * kOrderSide) + kHalf);
     const bool is_behind = key > front;
     behind |= OrderTileMask{is_behind} << tile;
+    least = std::min(least, is_behind ? key : UINT32_MAX);
     *end = (uint64_t{tile} << kItemKeyBits | key) << kItemNumberBits | index;
     end += !is_behind;
     counts_[tile] += !is_behind;
   }
   if (end != begin) order_.push_back(number);
   staged_count_ += static_cast<size_t>(end - begin);
+  if (behind != 0) splat.first = least;
   return behind;
 }
 

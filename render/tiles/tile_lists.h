@@ -59,10 +59,10 @@ class TileLists {
 
   /// Begins the lists of a tile, and forgets those of the tile before.
   void begin(const TileCorner& tile);
-  /// Lists a splat in those of `tiles` where its key is at most `front`; returns the others. Splats with
-  /// equal keys come in the order of the calls. `number`: the caller's number of the splat, which order()
-  /// returns.
-  OrderTileMask add(const ScreenSplat& splat, uint32_t number, OrderTileMask tiles, uint32_t front);
+  /// Lists a splat in those of `tiles` where its key is at most `front`; returns the others, and raises its
+  /// `first` to the least of its keys there. Splats with equal keys come in the order of the calls. `number`:
+  /// the caller's number of the splat, which order() returns.
+  OrderTileMask add(ScreenSplat& splat, uint32_t number, OrderTileMask tiles, uint32_t front);
   /// Sorts the lists. order() and lists() may be used from then until the next begin().
   void end();
 

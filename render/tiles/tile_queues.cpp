@@ -220,10 +220,11 @@ void TileQueues::compact(Queue& queue, std::vector<Active>& active) {
   shorten(queue, count);
 }
 
-/// Lists what lies up to the front, and keeps in `active` what has more behind it.
+/// Lists what lies up to the front, and keeps in `active` what has more behind it. The `first` of what is kept becomes about
+/// the least key that it has left, so that it is not looked at again before the front is there.
 void TileQueues::listActive(uint32_t front, OrderTileMask open, Scratch& scratch) const {
   for (Active& active : scratch.active) {
-    const ScreenSplat& splat = memory_[active.place];
+    ScreenSplat& splat = memory_[active.place];
     active.left &= open;
     if (splat.first <= front) active.left = scratch.lists.add(splat, active.place, active.left, front);
   }

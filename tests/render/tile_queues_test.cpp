@@ -370,6 +370,39 @@ TEST(TileLists, SortEachListByKeysAndThenByOrder) {
     }
 }
 
+/// Adds one leaning splat with fronts further and further back, as a tile does.
+TEST(TileLists, RaiseTheFirstKeyOfASplatToTheLeastThatIsLeft) {
+  ScreenSplat splat{};
+  splat.x = splat.y = 48;
+  splat.key = 20000;
+  splat.key_slope0 = 100;
+  splat.key_slope1 = -300;
+  const TileCorner corner{32, 32};
+  const auto keyIn = [&](size_t tile) {  // by the slopes: no key is held by `first`
+    const float x = 32 + 2 + 4 * static_cast<float>(tile % kOrderTilesAlong),
+                y = 32 + 2 + 4 * static_cast<float>(tile / kOrderTilesAlong);
+    return static_cast<uint32_t>(20000 + 100 * (x - 48) - 300 * (y - 48));
+  };
+  TileLists lists;
+  lists.begin(corner);
+  OrderTileMask left = 0x00ff3c18007e0501;
+  for (const uint32_t front : {0u, 17000u, 18800u, 20100u, 22500u}) {
+    OrderTileMask wanted = 0;
+    uint32_t least = UINT32_MAX;
+    for (size_t tile = 0; tile < kOrderTiles; ++tile)
+      if ((left >> tile & 1) != 0 && keyIn(tile) > front) {
+        wanted |= OrderTileMask{1} << tile;
+        least = std::min(least, keyIn(tile));
+      }
+    ASSERT_NE(wanted, 0u);
+    left = lists.add(splat, 0, left, front);
+    EXPECT_EQ(left, wanted) << front;
+    EXPECT_EQ(splat.first, least) << front;
+  }
+  EXPECT_EQ(lists.add(splat, 0, left, 30000), 0u);
+  EXPECT_EQ(splat.first, 22800u);
+}
+
 TEST(TileQueues, SayWhenMoreWaitThanTheyHold) {
   const auto splats = leaningSplats(1500, 4);
   TileQueues queues(kSize, 200, 0);
