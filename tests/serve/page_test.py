@@ -284,6 +284,11 @@ def typed_numbers(tab):
     rest(tab)
 
 
+def choose_automatic(tab):
+    tab.run("document.querySelector('#maps button').click()")  # the first of the list
+    tab.wait(f"{PAGE}.state.preset === 'automatic'", "the automatic function")
+
+
 def choose_map(tab, name):
     tab.run(f"document.querySelector('#maps [title={name}]').click()")
 
@@ -297,8 +302,7 @@ def numbers(tab):
         shown = tab.run("[0, 0.25, 0.5, 0.75, 1].map(numberAt)")
         expect(shown == expected, f"{low} to {high}: {shown}")
         tab.run("setRange(0.5, 1, false)")
-    tab.run("document.getElementById('automatic').click()")
-    tab.wait(f"{PAGE}.state.preset === 'automatic'", "the automatic function")
+    choose_automatic(tab)
 
 
 def editing(tab):
@@ -346,7 +350,7 @@ def editing(tab):
     expect(abs(unit / (diagonal / 1000) - 1) < 0.01, f"a density of 10 is a unit of {diagonal / 1000}: {unit}")
     changes(tab, lambda: set_value(tab, "#unit", repr(diagonal / 100)), "the opacity unit")
     expect(abs(float(tab.run("document.getElementById('density').value"))) < 0.011, "the density follows the unit")
-    changes(tab, lambda: tab.click("#automatic"), "the automatic function")
+    changes(tab, lambda: choose_automatic(tab), "the automatic function")
     for name in ("scalar_bar", "axes", "axes_grid", "outline", "dark", "lit"):
         changes(tab, lambda name=name: tab.click(f"#{name}"), name)
     shot(tab, "dark_and_lit")
@@ -710,7 +714,13 @@ def two_scalars(tab):
     found = tab.run(f"{PAGE}.state.function")
     expect(found["Points"] == automatic[names[1]]["Points"] and found["ScalarOpacityUnitDistance"] == automatic[names[1]]["ScalarOpacityUnitDistance"],
            "an edited function is chosen anew for another scalar")
+    # So do those that a person chose when the opacities are chosen from the data; "automatic" in the list gives them up.
+    press(tab, "#band")
     press(tab, "#automatic")
+    wait_for(lambda: tab.run(f"{PAGE}.state.function.Points") == automatic[names[1]]["Points"], "the automatic opacities")
+    tab.wait("document.getElementById('map').textContent === 'magma'", "the colours that were chosen")
+    choose_automatic(tab)
+    tab.wait("document.getElementById('map').textContent !== 'magma'", "the data's colours")
     changes(tab, lambda: set_value(tab, "#scalar", first), "the first scalar")
     # A marker keeps the scalar that it was set in.
     tab.key("z")
@@ -854,8 +864,7 @@ with tempfile.TemporaryDirectory() as folder:
             print("editing done")
             copies_the_command(tab, caches, edited=False)
             copies_the_command(tab, caches, edited=True)
-            tab.click("#automatic")
-            tab.wait(f"{PAGE}.state.preset === 'automatic'", "the automatic function")
+            choose_automatic(tab)
             choose_map(tab, "viridis")
             tab.wait("document.getElementById('map').textContent === 'viridis'", "the colours")
             copies_the_command(tab, caches, edited=False, colours="viridis")
@@ -864,8 +873,7 @@ with tempfile.TemporaryDirectory() as folder:
             tab.wait("document.getElementById('map').textContent === 'magma'", "the colours")
             tab.run("setPoints([[0, 0.2], [0.3, 0.9], [1, 0.1]].map(([u, opacity]) => ({ u, opacity, midpoint: 0.5, sharpness: 0 }))); changed()")
             copies_the_command(tab, caches, edited=False, colours="magma")
-            tab.click("#automatic")
-            tab.wait(f"{PAGE}.state.preset === 'automatic'", "the automatic function")
+            choose_automatic(tab)
             saves_pictures(tab)
             print("command done")
             markers(tab)
