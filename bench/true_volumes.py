@@ -94,7 +94,7 @@ def axes_of(view):
 
 def depths_of(blocks, middle, scale, points):
     """The volume that lies behind each square of the picture, of each view: points in all cells, each with its share of the volume. They
-    are those of a sequence of low discrepancy, so that none line up with squares."""
+    are those of a sequence of low discrepancy along all axes and along any two, so that none line up with squares."""
     count = PIXELS // BLOCK
     sums = {view: np.zeros(count * count) for view in VIEWS}
     cells_of_blocks = [drawn_cells(xyz, values)[0] for xyz, values in blocks]
@@ -102,7 +102,7 @@ def depths_of(blocks, middle, scale, points):
     for corners in cells_of_blocks:
         first = np.arange(len(corners)) * float(per_cell)
         for n in range(per_cell):
-            u, v, w = (((first + n) * 1.2207440846057596 ** -axis % 1)[:, None] for axis in (1, 2, 3))
+            u, v, w = (((first + n) * prime ** 0.5 % 1)[:, None] for prime in (2, 3, 5))
             part = determinant(corners, u, v, w) / per_cell
             here = trilinear(corners, u, v, w) - middle
             for view in VIEWS:
