@@ -34,6 +34,12 @@ struct ShownFunction {
 /// The title of a scalar: "density [kg/m3]", or "density" if the unit is unknown.
 std::string scalarTitle(const std::string& name, const std::string& unit);
 
+/// A point of the data, before --scale, and the text beside it.
+struct MarkerSign {
+  glm::dvec3 point;
+  std::string text;
+};
+
 /// The scene to annotate.
 struct AnnotatedScene {
   ImageSize picture;  // the whole picture
@@ -54,6 +60,7 @@ struct AnnotatedScene {
     bool isOfDepths() const { return lower.z + upper.z < 0; }
   };
   std::optional<OnGlobe> on_globe = std::nullopt;  // the axes grid is this box
+  std::vector<MarkerSign> markers = {};
 };
 
 /// A round number on a scale.

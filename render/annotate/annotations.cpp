@@ -127,6 +127,7 @@ constexpr double kBarLeft = 0.6, kBarWidth = 1.3, kLabelGap = 0.7;
 constexpr double kCurveWidth = 1.1;  // of opacities, left of the colours
 // Offset from its right edge.
 constexpr double kTitleWidth = 1.4, kTitleGap = 0.4;
+constexpr double kTitleFoot = 0.65;     // below its letters' line: as far from the edge as from the numbers
 constexpr double kLongestTitle = 0.96;  // of the picture's height
 
 struct ScalarBar {
@@ -210,7 +211,7 @@ void drawBar(cairo_t* cairo, const ShownFunction& shown, ImageSize picture, doub
   cairo_save(cairo);
   fitFont(cairo, font, shown.title, kLongestTitle * picture.height);
   cairo_text_extents(cairo, shown.title.c_str(), &extents);
-  cairo_translate(cairo, right - (kTitleWidth - 1) * font, bar.top + bar.height / 2);
+  cairo_translate(cairo, right - kTitleFoot * font, bar.top + bar.height / 2);
   cairo_rotate(cairo, -std::numbers::pi / 2);
   cairo_move_to(cairo, -extents.x_advance / 2, 0);
   cairo_show_text(cairo, shown.title.c_str());
@@ -258,6 +259,38 @@ void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& in
   cairo_restore(cairo);
 }
 
+// ------------------------------------------------------------------------------------------- markers
+
+/// Draws a dot at each point, whatever lies before it, and the text in a dark box at its right, as the window does.
+void drawMarkers(cairo_t* cairo, const AnnotatedScene& scene) {
+  constexpr glm::dvec3 kLight(1.0), kDark(0.0);
+  const ScreenView& view = scene.view;
+  const double font = fontSize(scene.picture, scene.text_size), radius = 0.3 * font, margin = 0.2 * font;
+  cairo_font_extents_t line;
+  cairo_font_extents(cairo, &line);
+  for (const MarkerSign& marker : scene.markers) {
+    const glm::dvec3 seen = view.viewFromData(marker.point);
+    if (view.projection == Projection::kPerspective && seen.z < view.near) continue;
+    const glm::dvec2 at = view.pixelFromView(seen);
+    if (!(at.x >= 0 && at.x <= view.size.width && at.y >= 0 && at.y <= view.size.height)) continue;
+    for (const auto& [ink, part] : {std::pair(kDark, 1.0), {kLight, 0.7}}) {
+      setInk(cairo, ink);
+      cairo_arc(cairo, at.x, at.y, part * radius, 0, 2 * std::numbers::pi);
+      cairo_fill(cairo);
+    }
+    if (marker.text.empty()) continue;
+    cairo_text_extents_t text;
+    cairo_text_extents(cairo, marker.text.c_str(), &text);
+    const double height = line.ascent + line.descent, left = at.x + 1.5 * radius, top = at.y - 0.5 * height;
+    setInk(cairo, kDark, 0.67);
+    cairo_rectangle(cairo, left, top, text.x_advance + 2 * margin, height);
+    cairo_fill(cairo);
+    setInk(cairo, kLight);
+    cairo_move_to(cairo, left + margin, top + line.ascent);
+    cairo_show_text(cairo, marker.text.c_str());
+  }
+}
+
 // -------------------------------------------------------------------------------------- all together
 
 /// Draws what lies over the data and beside it.
@@ -272,6 +305,7 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene) {
   if (annotations.outline) drawOutline(cairo, scene, ink, false);
   if (annotations.axes_grid) drawAxesLabels(cairo, scene, ink);
   if (annotations.axes) drawAxes(cairo, scene, ink);
+  if (annotations.markers) drawMarkers(cairo, scene);
   if (annotations.texts) drawTexts(cairo, scene, ink);
   cairo_restore(cairo);
   if (annotations.scalar_bar) drawScalarBars(cairo, scene, ink);

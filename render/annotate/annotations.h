@@ -1,5 +1,5 @@
 // Annotations drawn over a picture: scalar bars, the directions of the axes, the box around the data, a grid
-// with coordinates; and a picture of the built-in colour maps. `render` and the window share them.
+// with coordinates, markers; and a picture of the built-in colour maps. `render` and the window share them.
 //
 // Scalar bars have a strip of their own at the right, so that they never cover data. Drawing takes 4
 // bytes a pixel, and 16 a pixel of the bars (annotatedBytes()). Pure; any thread. In a build without Cairo asking for an annotation is a
@@ -29,6 +29,7 @@ struct Annotations {
   bool outline = false;
   bool axes_grid = false;
   bool texts = false;    // the scene's title and label
+  bool markers = false;  // the scene's
   double text_size = 0;  // of the font, in pixels; 0: by the picture's height
 
   /// Whether lines of them lie behind the data, which then has to be drawn over a transparent background.

@@ -242,6 +242,35 @@ TEST_F(Annotations, TextsSayWhatIsShown) {
   refused("--label", "t = {time", "has a { without its }");
 }
 
+/// A unit of the data is 40 of the 160 rows: the point (1, 0.5, 0) lies 40 pixels right of the middle and 20 above it.
+TEST_F(Annotations, AMarkerStandsAtItsPointWithItsTextBesideIt) {
+  const auto seen = [](const Words& options) {
+    return render(Words{"--position", "0,0,10", "--focal-point", "0,0,0", "--view-up", "0,1,0",
+                        "--parallel-scale", "2"} +
+                  options);
+  };
+  const Image plain = seen({}), dot = seen({"--marker", "1,0.5,0"}),
+              text = seen({"--marker", "1,0.5,0:a: b"});
+  constexpr int kX = 140, kY = 60, kReach = 4;
+  for (int channel = 0; channel < 3; ++channel) EXPECT_GT(dot.pixel(kX, kY)[channel], 0.9f);
+  EXPECT_GT(changed(plain, dot, kX - kReach, kX + kReach, kY - kReach, kY + kReach), 12);
+  EXPECT_EQ(changed(plain, dot, 0, 200, 0, 160),
+            changed(plain, dot, kX - kReach, kX + kReach, kY - kReach, kY + kReach));
+  EXPECT_GT(changed(dot, text, kX + kReach, 200, kY - 8, kY + 8), 60);
+  EXPECT_EQ(changed(dot, text, 0, kX, 0, 160), 0);
+  EXPECT_EQ(changed(dot, text, 0, 200, 0, kY - 8) + changed(dot, text, 0, 200, kY + 8, 160), 0);
+  EXPECT_EQ(changed(plain, seen({"--marker", "1,0.5,0", "--marker", "-1,-0.5,0"}), 96, 104, 96, 104), 0);
+  EXPECT_GT(changed(plain, seen({"--marker", "1,0.5,0", "--marker", "-1,-0.5,0"}), 56, 64, 96, 104), 12);
+  // Stretched, the data's point lies further up.
+  EXPECT_GT(changed(seen({"--scale", "1,2,1"}), seen({"--scale", "1,2,1", "--marker", "1,0.5,0"}),
+                    kX - kReach, kX + kReach, 40 - kReach, 40 + kReach),
+            12);
+  const ProgramResult wrong =
+      runProgram({"render", file("a.splats"), "-o", file("b.png"), "--marker", "1,2:a"});
+  EXPECT_EQ(wrong.status, 2);
+  expectSays(wrong.err, "--marker 1,2: expected x,y,z, found 2 numbers");
+}
+
 /// Each frame of a film says its own step and time, though the next one's is read while it is written.
 TEST_F(Annotations, TextsFollowTheFrames) {
   run({"generate", "wake", "--size", "16x12x8", "--steps", "3", "-o", file("w")});

@@ -42,6 +42,7 @@ EDGES = {  # values at the edges of what an option takes, by its name
     "--shadow": NUMBERS, "--text-size": NUMBERS, "--ambient-occlusion": NUMBERS, "--from-height": NUMBERS, "--lines-time": ["past", "all", "-1", "nan", "1e308", "1e308 days"],
     "--globe": ["off", "1", "nan", "-1", "1e308"], "--background": COLOURS, "--surface-colour": COLOURS, "--lines-colour": COLOURS,
     "--surface-opacity": OPACITIES, "--slice-opacity": OPACITIES, "--iso-opacity": OPACITIES, "--lines-opacity": OPACITIES, "--title": TITLES, "--label": TITLES,
+    "--marker": [*VECTORS, "0,0,0:", "0.5,0,0:a: b", ":", "0,0,0:" + "x" * 5000, "0,0,0:\n\n"],
     "--iso": ["0.5", "0,1,2", "nan", "1e308", ",".join(str(n / 1000) for n in range(1000)), ",", "0.5,", "-1e-320"], "--surface": FACES,
     "--line-width": LENGTHS, "--point-size": LENGTHS, "--steps": ["0:1", "2:0", "0:99", "0:2:0", ":", "0:", "0:2:99999999999999999999", "all:2"],
     "--path": ["none.json", "/dev/null", "g.xyz", "."], "--frames": COUNTS[:-2], "--frame-rate": [*NUMBERS, "24000/1001"], "--orbit": NUMBERS, "--zoom": NUMBERS,

@@ -190,6 +190,27 @@ TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {
   close();
 }
 
+/// A licence is not listed with the files.
+TEST_F(WindowOpening, ShiftTakesTheFilesBetween) {
+  fs::create_directory("between");
+  run({"generate", "wake", "--size", "24x16x12", "--steps", "3", "-o", "between/s"});
+  std::ofstream("between/LICENSE") << "text";
+  std::ofstream("between/z.xyz") << "another grid";
+  openWith({});
+  click("open");
+  placeOf("file name");
+  act({"type", "between"});
+  press("Return");
+  click("file s.xyz");
+  EXPECT_FALSE(hasWidget("file LICENSE"));
+  moveTo(placeOf("file s_0002.fun"));
+  act({"keydown", "shift", "click", "1", "keyup", "shift"});
+  click("file accept");
+  placeOf("curve");
+  placeOf("step");
+  close();
+}
+
 TEST_F(WindowOpening, WithoutAFileItAsksForOneAndRemembersIt) {
   openWith({});
   click("open");

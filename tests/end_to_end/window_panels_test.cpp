@@ -134,6 +134,20 @@ TEST_F(WindowPanels, MarkersSayHowFarApartTheyAre) {
   close();
 }
 
+/// The window shows them by signs of its own; what it saves has them, and the command draws them.
+TEST_F(WindowPanels, MarkersAreInSavedPicturesAndInTheCommand) {
+  open();
+  const Image without = save();
+  click(placeOf("picture"));
+  widget("sign of marker 1");
+  save();  // before it, the click's message
+  const Image with = saveAndCopy();
+  EXPECT_LT(difference(without, with), 45);
+  const auto command = close().at(0);
+  EXPECT_NE(valueOf(command, "--marker").find(":1: "), std::string::npos) << valueOf(command, "--marker");
+  expectDraws(command, with);
+}
+
 TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
   open();
   press("x");
@@ -541,6 +555,23 @@ TEST_F(WindowPanels, ARangeLeavesOutOnePercentAtEachEnd) {
       nlohmann::json::parse(run({"info", "--json", "a.splats"}).out).at("histograms")[0].at("percentiles");
   EXPECT_NEAR(range[0], percentiles[10].get<double>(), 1e-3);
   EXPECT_NEAR(range[1], percentiles[990].get<double>(), 1e-3);
+}
+
+TEST_F(WindowPanels, ARampKeepsTheLogarithmicScale) {
+  open();
+  chooseScalar("volume");  // above zero
+  save();
+  widget("scale ");
+  EXPECT_TRUE(eventually([&] {
+    if (!hasWidget("scale logarithmic")) click("log scale");
+    return eventually([&] { return hasWidget("scale logarithmic"); }, 5);
+  }));
+  const Image before = save();
+  click("ramp");
+  moveTo(rest_);
+  EXPECT_TRUE(eventually([&] { return difference(before, save()) < 50; }));
+  EXPECT_TRUE(hasWidget("scale logarithmic"));
+  close();
 }
 
 /// The button chooses range and opacities; the colours are chosen in their own list.

@@ -187,6 +187,25 @@ TEST_F(WindowsCamera, KeysLookAlongTheAxes) {
   EXPECT_NEAR(glm::length(seen[last + 2].position - seen[last].position), 0, kRounded);
 }
 
+/// The key does so in a window that opened as the one before it was left, too.
+TEST_F(WindowsCamera, TheFirstViewComesBack) {
+  open();
+  const Image first = save();
+  press("y");
+  dragPicture(1, 0.2, 0.1);
+  EXPECT_LT(difference(first, save()), 30);
+  press("shift+r");
+  EXPECT_EQ(save().rgba, first.rgba);
+  press("x");
+  EXPECT_LT(difference(first, save()), 30);
+  close();
+  open();
+  EXPECT_LT(difference(first, save()), 30);
+  press("shift+r");
+  EXPECT_EQ(save().rgba, first.rgba);
+  close();
+}
+
 TEST_F(WindowsCamera, ArrowsTurnTheCameraAsTheOptionsDo) {
   open();
   press("z");

@@ -185,8 +185,9 @@ TEST_F(BackgroundJobTest, CountsPictures) {
     EXPECT_TRUE(eventually([&] { return job.isDone(); }));
     return job.phase();
   };
-  EXPECT_EQ(phaseOf("drawing frames", 90, "frames"), "drawing frames, 12 of 90");
-  EXPECT_EQ(phaseOf("drawing frames", 1, "frames"), "drawing frames");
+  EXPECT_EQ(phaseOf("drawing pictures", 90, kPicturesUnit), "drawing pictures, 12 of 90");
+  EXPECT_EQ(phaseOf("drawing pictures", 1, kPicturesUnit), "drawing pictures");
+  EXPECT_EQ(phaseOf("seams", 90, "nodes"), "joining blocks");  // a pass of Conversion
   EXPECT_EQ(phaseOf("sorting splats", 90, "splats"), "sorting splats");
 }
 

@@ -114,6 +114,7 @@ TEST(EditedFunction, AnIsosurfaceBeginsInTheMiddleOfWhatIsSeen) {
   EXPECT_NEAR(middleOfSeen(even, function), 10 + 10 * std::sqrt(0.5), 1e-3);
   function.setOpacities({{0, 0}, {1, 0}});
   EXPECT_NEAR(middleOfSeen(even, function), 15, 1e-9);
+  EXPECT_NEAR(middleOfSeen(even, function, 0.25), 12.5, 1e-9);
   EXPECT_NEAR(middleOfSeen({}, function), 15, 1e-9);
   EXPECT_NEAR(middleOfSeen({0, 0, 0}, function), 15, 1e-9);
   // All of the volume in the second of four bins.

@@ -433,6 +433,7 @@ TEST(RenderCommand, HasEveryOption) {
   state.dark = false;
   state.gradient_opacity = {{0, 0.25}, {0.5, 1}, {1, 0}};
   state.annotations = {.scalar_bar = true, .outline = true};
+  state.markers = {{"nose", {0.5, 0.25, 0.125}, "density", "kg/m3", 1.5}, {"2", {-1, 0, 0}, "u v", "", 0.25}};
   state.classification = Classification::kFlat;
   expectParts(commandText(state, "it's\x1b[2J \\\u009b.splats"), {R"($'it\'s\033[2J \\\302\233.splats')"});
   expectParts(commandText(state, "it's.splats"), {"'it'\\''s.splats'",
@@ -452,6 +453,8 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--classify flat",
                                                   "--lod-pixels 2.5",
                                                   "--scalar-bar --outline",
+                                                  "--marker '0.5,0.25,0.125:nose: density 1.5 kg/m3'",
+                                                  "--marker='-1,0,0:2: 0.25'",
                                                   "--position 0.1,-3,0.66667",
                                                   "--surface /a/wing.stl",
                                                   "--surface-colour '#ff8000'",

@@ -379,7 +379,7 @@ std::vector<std::string> faceNamesOf(const CacheReader& cache) {
   std::sort(names.begin(), names.end());
   if (names.size() > 1) names.insert(names.begin(), "all");
   if (std::any_of(faces->regions().begin(), faces->regions().end(), isWall) || hasWallsByFlow(cache, *faces))
-    add(names, "walls");
+    if (known.insert("walls").second) names.insert(names.begin(), "walls");  // what people look for most
   if (has_blanks) add(names, kBlanks);
   // A comma is taken for the end of a name.
   for (const FaceRegion& region : faces->regions())

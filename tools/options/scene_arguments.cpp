@@ -431,6 +431,12 @@ void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, con
       ->group(group);
   command.add_flag("--outline", arguments.shown.outline, "Draw the bounding box of the data")->group(group);
   command
+      .add_option("--marker", arguments.markers,
+                  "Mark a point of the data (before --scale), with a text: X,Y,Z:TEXT or X,Y,Z; repeatable")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
       .add_option(
           "--title", arguments.title,
           "Title above the data; {time}, {step}, {frame}, {scalar} and {units} stand for what is shown")
@@ -444,6 +450,15 @@ void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, con
                   "Size of the font of all these, in pixels (default: 1/42 of the picture's height)")
       ->group(group);
 }
+
+namespace {
+
+MarkerSign parseMarker(const std::string& text) {
+  const size_t end = std::min(text.find(':'), text.size());
+  return {parsePoint("--marker", text.substr(0, end)), text.substr(std::min(end + 1, text.size()))};
+}
+
+}  // namespace
 
 void checkAnnotationArguments(const AnnotationArguments& arguments) {
   if (arguments.no_bars && !arguments.bar_titles.empty())
@@ -459,6 +474,7 @@ void AnnotationArguments::showTitles() {
   shown.scalar_bar |= !bar_titles.empty();
   shown.axes_grid |= axis_titles.has_value();
   shown.texts = title || label;
+  shown.markers = !markers.empty();
   if (!text_size) return;
   shown.text_size = parsePositive("--text-size", *text_size);
   if (!(shown.text_size >= kMin && shown.text_size <= kMax))
@@ -469,6 +485,7 @@ void AnnotationArguments::fill(const TextFields& fields, AnnotatedScene& scene) 
   scene.text_size = shown.text_size;
   if (title) scene.title = filledText("--title", *title, fields);
   if (label) scene.label = filledText("--label", *label, fields);
+  for (const std::string& marker : markers) scene.markers.push_back(parseMarker(marker));
 }
 
 void AnnotationArguments::put(const std::optional<AnnotatedScene::OnGlobe>& box,

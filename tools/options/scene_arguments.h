@@ -101,18 +101,18 @@ std::vector<std::string> curvesThatMiss(const SurfaceArguments& arguments, const
 struct AnnotationArguments {
   Annotations shown;
   bool no_bars = false;  // none by default
-  std::vector<std::string> bar_titles;
+  std::vector<std::string> bar_titles, markers;
   std::optional<std::string> axis_titles, title, label, text_size;
 
   /// Shows what the titles need, in text of the size that is given.
   void showTitles();
   /// Gives the axes grid the longitudes, latitudes and heights of `box`, if it is given, and their titles.
   void put(const std::optional<AnnotatedScene::OnGlobe>& box, AnnotatedScene& scene) const;
-  /// The scene's texts, with their fields filled in.
+  /// The scene's texts, with their fields filled in, and its markers.
   void fill(const TextFields& fields, AnnotatedScene& scene) const;
 };
 
-/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles, --outline, --title, --label and --text-size under the
+/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles, --outline, --marker, --title, --label and --text-size under the
 /// heading `group`.
 void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group);
 

@@ -62,8 +62,8 @@ void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelAc
   does.play |= button(film.isPlaying() ? "Stop" : "Play", "play film", film.end() > film.begin(), nullptr);
   does.open |= button("Open...", "open film", true, "a file of key frames, as render --path draws it");
   ImGui::SameLine();
-  does.save |=
-      button("Save...", "save film", has_keys, "the key frames, for render --path and for the next time");
+  does.save |= button("Save keys...", "save film", has_keys,
+                      "the key frames, for render --path and for the next time");
   ImGui::SameLine();
   ImGui::BeginDisabled(!has_keys);
   commandButton(Command::kSaveFilmMovie, actions, "Save film...");

@@ -113,22 +113,31 @@ void paintColours(const EditedFunction& function) {
 void paintNumbers(const EditedFunction& function) {
   const ImVec2 lower = ImGui::GetCursorScreenPos();
   const float width = availableWidth();
-  constexpr int kNumbers = 4;
-  const auto scalar = [&](int n) { return function.scalarAt(static_cast<double>(n) / kNumbers); };
+  constexpr int kIntervals = 4;
+  const auto scalar = [&](int n) { return function.scalarAt(static_cast<double>(n) / kIntervals); };
   // The numbers have as many digits as tell neighbours apart: 0.999, 1.001 and not 0.999, 1.
   double closest = std::abs(scalar(1) - scalar(0)), largest = 0;
-  for (int n = 0; n <= kNumbers; ++n) {
+  for (int n = 0; n <= kIntervals; ++n) {
     largest = std::max(largest, std::abs(scalar(n)));
     if (n > 0) closest = std::min(closest, std::abs(scalar(n) - scalar(n - 1)));
   }
   const double ratio = closest > 0 ? std::min(largest / closest, 1e6) : 1;
   const int digits = std::clamp(static_cast<int>(std::ceil(std::log10(ratio))) + 1, 3, 5);
-  for (int n = 0; n <= kNumbers; ++n) {
-    const float part = static_cast<float>(n) / kNumbers;
-    const std::string text = fmt::format("{:.{}g}", scalar(n), digits);
-    const float own = ImGui::CalcTextSize(text.c_str()).x;
-    ImGui::GetWindowDrawList()->AddText({lower.x + part * (width - own), lower.y},
-                                        ImGui::GetColorU32(ImGuiCol_Text), text.c_str());
+  const auto textOf = [&](int n) { return fmt::format("{:.{}g}", scalar(n), digits); };
+  const auto leftOf = [&](int n) {
+    return static_cast<float>(n) / kIntervals * (width - ImGui::CalcTextSize(textOf(n).c_str()).x);
+  };
+  // Long numbers, as those of logarithmic scales, stand at every second place.
+  const float gap = 0.4f * ImGui::GetFontSize();
+  bool fits = true;
+  for (int n = 0; n < kIntervals; ++n)
+    fits &= leftOf(n) + ImGui::CalcTextSize(textOf(n).c_str()).x + gap <= leftOf(n + 1);
+  for (int n = 0; n <= kIntervals; n += fits ? 1 : 2) {
+    ImGui::GetWindowDrawList()->AddText({lower.x + leftOf(n), lower.y}, ImGui::GetColorU32(ImGuiCol_Text),
+                                        textOf(n).c_str());
+    nameArea("number " + textOf(n), static_cast<double>(lower.x + leftOf(n)), static_cast<double>(lower.y),
+             static_cast<double>(ImGui::CalcTextSize(textOf(n).c_str()).x),
+             static_cast<double>(ImGui::GetTextLineHeight()));
   }
   ImGui::Dummy({width, ImGui::GetTextLineHeight()});
 }

@@ -387,7 +387,9 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   ImGui::SameLine(0, gap);
   if (button("ramp", "Ramp", "the colour map with its own opacities, which rise with the values")) {
     const std::string name = function.map().empty() ? kMapsOnDark.sequential : function.map();
+    const bool log_scale = function.logScale();
     function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
+    function.setLogScale(log_scale);
     result.changed = true;
   }
   const auto set = [&](const char* name, const char* text, const char* what,

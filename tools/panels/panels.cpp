@@ -390,6 +390,8 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   const bool perspective = state.camera.projection == Projection::kPerspective;
   commandButton(Command::kFit, actions, "Fit");
   ImGui::SameLine();
+  commandButton(Command::kFirstView, actions, "First view");
+  ImGui::SameLine();
   commandOption(Command::kOtherProjection, actions, "perspective", perspective);
   ImGui::SameLine();
   commandOption(Command::kFly, actions, "fly", facts.flies);

@@ -293,10 +293,7 @@ void drawMarkerSigns(const ViewState& state, const PlaceInWindow& place) {
     const ImVec2 centre(static_cast<float>(at->x), static_cast<float>(at->y));
     list->AddCircleFilled(centre, radius, edge);
     list->AddCircleFilled(centre, 0.7f * radius, line);
-    // Beside another scalar than the one that is shown stands its name.
-    const std::string text =
-        fmt::format("{}: {}{}{:.4g} {}", marker.name, marker.scalar == state.variable ? "" : marker.scalar,
-                    marker.scalar == state.variable ? "" : " ", marker.value, marker.unit);
+    const std::string text = signOf(marker, state.variable);
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
     const ImVec2 lower(centre.x + 1.5f * radius, centre.y - 0.5f * size.y);
     list->AddRectFilled({lower.x - 3, lower.y - 1}, {lower.x + size.x + 3, lower.y + size.y + 1},

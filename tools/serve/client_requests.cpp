@@ -146,6 +146,7 @@ ViewRequest viewIn(const JsonField& message, size_t caches) {
   view.cache = cacheIn(message, caches);
   view.size = sizeIn(message);
   view.moving = message.at("moving").flag();
+  if (const auto saves = message.find("saves")) view.saves = saves->flag();
   view.step = message.at("step").count(0, kMaxNumber);
   if (const auto next = message.find("next")) view.next = next->count(0, kMaxNumber);
   view.state = stateIn(message);

@@ -11,7 +11,7 @@
 //   {"type": "open", "cache": 0,                 asks for a cache's facts and its first view
 //    "size": [800, 600]}
 //   {"type": "view", "number": 7, "cache": 0,    asks for a picture; `state` is ViewState's JSON, `next` the
-//    "size": [800, 600], "moving": true,         step that is wanted after this one
+//    "size": [800, 600], "moving": true,         step that is wanted after this one; "saves": true draws markers, too
 //    "step": 0, "next": 1, "state": {...}}
 //   {"type": "choose", "cache": 0,               asks for the automatic function of a scalar on a dark or
 //    "scalar": "density", "dark": true}          a white background
@@ -86,12 +86,14 @@ struct ViewRequest {
   size_t cache = 0;
   ImageSize size;
   bool moving = false;
+  bool saves = false;  // the picture has the state's markers
   uint64_t step = 0;
   std::optional<uint64_t> next;
   std::string state;
 
   bool showsSameAs(const ViewRequest& other) const {
-    return cache == other.cache && size == other.size && step == other.step && state == other.state;
+    return cache == other.cache && size == other.size && step == other.step && state == other.state &&
+           saves == other.saves;
   }
 };
 struct FunctionRequest {

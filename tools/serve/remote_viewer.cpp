@@ -151,6 +151,7 @@ class RemoteViewer::Work {
       ViewState state = viewStateFromJson(view.state, "view", reader.manifest());
       state.surfaces.clear();  // they name files
       state.memory_bytes = limits_.memory_bytes;
+      if (view.saves) state.annotations = savedAnnotations(state);
       request(view, std::move(state));
     } catch (const UsageError& error) {
       report(error);

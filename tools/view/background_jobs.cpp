@@ -11,6 +11,8 @@
 #include <deque>
 #include <exception>
 #include <functional>
+#include <map>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -22,8 +24,25 @@
 namespace curvisplat {
 namespace {
 
-constexpr const char* kFramesUnit = "frames";
 constexpr int kNice = 10;  // the window and its picture come first
+
+/// Returns what people see being done in a pass of a conversion, whose name is that of the code.
+std::string wordsOf(const std::string& phase) {
+  static const std::map<std::string, const char*> words{{"scan", "reading the grid"},
+                                                        {"scan again", "reading the grid"},
+                                                        {"sample", "reading the grid"},
+                                                        {"count", "counting its nodes"},
+                                                        {"drawn nodes", "comparing the nodes"},
+                                                        {"merged nodes", "comparing the nodes"},
+                                                        {"scatter", "making splats"},
+                                                        {"seams", "joining blocks"},
+                                                        {"build", "writing splats"},
+                                                        {"faces", "writing faces"},
+                                                        {"check", "checking what is there"},
+                                                        {"finish", "finishing"}};
+  const auto found = words.find(phase);
+  return found == words.end() ? phase : found->second;
+}
 
 /// Calls it at the end of its lifetime.
 struct WakeAtEnd {
@@ -106,9 +125,9 @@ BackgroundJob::BackgroundJob(std::string title, std::string phase, Work work, vo
         {
           const MutexLock lock(mutex_);
           const uint64_t done = state->done + state->skipped;
-          // People count pictures, and neither bytes nor splats.
-          const bool counts = state->unit == kFramesUnit && state->total > 1;
-          phase_ = state->phase + (counts ? fmt::format(", {} of {}", done, state->total) : "");
+          // Neither bytes nor splats are counted.
+          const bool counts = state->unit == kPicturesUnit && state->total > 1;
+          phase_ = wordsOf(state->phase) + (counts ? fmt::format(", {} of {}", done, state->total) : "");
           part_ = state->total > 0 ? static_cast<float>(done) / static_cast<float>(state->total) : 0;
         }
         wake();

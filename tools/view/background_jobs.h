@@ -70,6 +70,9 @@ struct ConversionServices {
   std::function<Paths()> example;
 };
 
+/// The unit of pictures and of those of a movie, which people count.
+inline constexpr const char* kPicturesUnit = "pictures";
+
 /// A job on threads of low priority: its progress, and the file that it makes.
 class BackgroundJob {
  public:
@@ -84,7 +87,7 @@ class BackgroundJob {
   BackgroundJob& operator=(const BackgroundJob&) = delete;
 
   const std::string& title() const { return title_; }
-  /// The current phase: "sorting splats", or with its pictures "drawing frames, 12 of 90"; and the part of it that is
+  /// The current phase: "sorting splats", or with its pictures "drawing pictures, 12 of 90"; and the part of it that is
   /// done, 0 if that is not known.
   std::string phase() const;
   float part() const;

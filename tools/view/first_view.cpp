@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -40,7 +41,7 @@ EditedFunction automaticFunction(const CacheReader& cache, const std::string& sc
   return EditedFunction::automatic(choiceOf(cache, scalar).function());
 }
 
-double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function) {
+double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function, double share) {
   const OpacityCurve opacities(function.points());
   const auto count = static_cast<double>(histogram.size());
   const auto sumsOf = [&](bool with_opacity) {
@@ -53,12 +54,12 @@ double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& 
   };
   std::vector<double> sums = sumsOf(true);
   if (!(sums.back() > 0)) sums = sumsOf(false);
-  if (!(sums.back() > 0)) return function.scalarAt(0.5);
-  const double half = 0.5 * sums.back();
-  const auto next = std::ranges::lower_bound(sums, half);  // not the first, which is 0
+  if (!(sums.back() > 0)) return function.scalarAt(share);
+  const double below = share * sums.back();
+  const auto next = std::ranges::lower_bound(sums, below);  // not the first, which is 0
   const double before = *(next - 1);
   return function.scalarAt(
-      (static_cast<double>(next - sums.begin()) - 1 + (half - before) / (*next - before)) / count);
+      (static_cast<double>(next - sums.begin()) - 1 + (below - before) / (*next - before)) / count);
 }
 
 double firstIsovalue(const CacheReader& cache, const ViewState& state, const std::string& scalar) {
@@ -67,7 +68,18 @@ double firstIsovalue(const CacheReader& cache, const ViewState& state, const std
   EditedFunction function(kMapsOnDark.sequential, info.min, info.max, state.function.opacityUnit());
   if (state.opacityScalar() == scalar)
     function = state.opacity_by ? state.opacity_by->function : state.function;
-  return middleOfSeen(histogramOf(cache, variable, function, kHistogramBins), function);
+  const std::vector<double> histogram = histogramOf(cache, variable, function, kHistogramBins);
+  // A second one at the place of the first would not be seen.
+  constexpr double kShares[]{0.5, 0.75, 0.25, 0.875, 0.625, 0.375, 0.125}, kApart = 0.01;  // of the range
+  const auto is_taken = [&](double value) {
+    return std::ranges::any_of(state.isosurfaces, [&](const Isosurface& one) {
+      return one.scalar == scalar &&
+             std::abs(function.coordinateOf(one.value) - function.coordinateOf(value)) < kApart;
+    });
+  };
+  for (const double share : kShares)
+    if (const double value = middleOfSeen(histogram, function, share); !is_taken(value)) return value;
+  return middleOfSeen(histogram, function);
 }
 
 EditedFunction chosenAnew(const EditedFunction& before, EditedFunction automatic) {

@@ -23,12 +23,12 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
 /// The function that is chosen from the data for a scalar.
 EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar);
 
-/// The scalar that divides what a function shows into halves: of the volume, each part times its opacity. Where all is
-/// transparent it divides the volume, and without any volume the range. `histogram`: as of histogramOf().
-double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function);
+/// The scalar that divides what a function shows into halves, or has a `share` of it below: of the volume, each part times its
+/// opacity. Where all is transparent it divides the volume, and without any volume the range. `histogram`: as of histogramOf().
+double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function, double share = 0.5);
 
 /// The value at which an isosurface of a scalar begins: middleOfSeen() of the opacities that the state has for it, or of its
-/// volume. Reads the scalar's histogram at the cache's step. Throws UsageError if there is no such scalar, and Error as reading does.
+/// volume; where the state has an isosurface there, with another share. Reads the scalar's histogram at the cache's step. Throws UsageError if there is no such scalar, and Error as reading does.
 double firstIsovalue(const CacheReader& cache, const ViewState& state, const std::string& scalar);
 
 /// The function of another scalar, after `before`: the automatic one, with its opacities and their unit, which those of the

@@ -67,12 +67,20 @@ ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize
   return dataSize(state.annotations, picture, functions.bars());
 }
 
+Annotations savedAnnotations(const ViewState& state) {
+  Annotations saved = state.annotations;
+  saved.markers = !state.markers.empty();
+  return saved;
+}
+
 AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
                        ImageSize picture, const std::optional<AnnotatedScene::OnGlobe>& box) {
   AnnotatedScene scene{picture,          frame.view,       functions.bars(),
                        frame.data.lower, frame.data.upper, state.background()};
   scene.text_size = state.annotations.text_size;
   scene.title = state.title;
+  for (const Marker& marker : state.markers)
+    scene.markers.push_back({marker.point, signOf(marker, state.variable)});
   showOnGlobe(box, scene);
   return scene;
 }

@@ -53,7 +53,10 @@ class GlobeGrid {
   std::optional<AnnotatedScene::OnGlobe> box_;
 };
 
-/// The annotations of a frame that was drawn for this state; `box`: GlobeGrid::boxOf().
+/// The annotations of pictures that are saved: markers, too, which the window and the page show by signs of their own.
+Annotations savedAnnotations(const ViewState& state);
+
+/// The scene of a frame that was drawn for this state; `box`: GlobeGrid::boxOf().
 AnnotatedScene sceneOf(const ViewState& state, const ShownFunctions& functions, const ShownFrame& frame,
                        ImageSize picture, const std::optional<AnnotatedScene::OnGlobe>& box);
 

@@ -216,11 +216,16 @@ void addFunctions(const ViewState& state, const CommandOptions& options, Command
   addOpacities(function, words);
 }
 
+/// Half the height of what is seen at the focal point.
+double halfHeight(const Camera& camera) {
+  if (camera.projection != Projection::kPerspective) return camera.parallel_scale;
+  return glm::length(camera.position - camera.focal_point) *
+         std::tan(0.5 * glm::radians(camera.view_angle_deg));
+}
+
 void addCamera(const Camera& camera, CommandLine& words) {
   const bool perspective = camera.projection == Projection::kPerspective;
-  const double half_height = perspective ? glm::length(camera.position - camera.focal_point) *
-                                               std::tan(0.5 * glm::radians(camera.view_angle_deg))
-                                         : camera.parallel_scale;
+  const double half_height = halfHeight(camera);
   words.add("--position", numbers(camera.position, half_height));
   words.add("--focal-point", numbers(camera.focal_point, half_height));
   if (camera.view_up != glm::dvec3(0, 0, 1)) words.add("--view-up", numbers(camera.view_up, 1));
@@ -363,6 +368,9 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   if (state.annotations.axes) words.add("--axes");
   if (state.annotations.axes_grid) words.add("--axes-grid");
   if (state.annotations.outline) words.add("--outline");
+  for (const Marker& marker : state.markers)
+    words.add("--marker", fmt::format("{}:{}", numbers(marker.point, halfHeight(state.camera)),
+                                      signOf(marker, state.variable)));
   if (!state.title.empty()) words.add("--title", withoutFields(state.title));
   if (state.annotations.text_size > 0) words.add("--text-size", number(state.annotations.text_size));
   return words.text();

@@ -448,6 +448,12 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   return options;
 }
 
+std::string signOf(const Marker& marker, const std::string& scalar) {
+  const bool is_shown = marker.scalar == scalar;
+  return fmt::format("{}: {}{}{:.4g}{}{}", marker.name, is_shown ? "" : marker.scalar, is_shown ? "" : " ",
+                     marker.value, marker.unit.empty() ? "" : " ", marker.unit);
+}
+
 void ViewState::setTitle(std::string text) {
   size_t length = std::min(text.size(), kLongestTitle);
   const auto continuesLetter = [&](size_t at) { return at < text.size() && (text[at] & 0xc0) == 0x80; };

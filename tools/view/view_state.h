@@ -73,6 +73,9 @@ struct Marker {
   uint64_t i = 0, j = 0, k = 0;
 };
 
+/// The text beside a marker in a picture that shows `scalar`: "1: 1.45 kg/m3"; the value of another scalar has its name.
+std::string signOf(const Marker& marker, const std::string& scalar);
+
 /// The scalar whose opacities are drawn, where it is not the one that gives the colours.
 struct OpacityScalar {
   std::string variable;

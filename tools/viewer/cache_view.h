@@ -118,6 +118,7 @@ class CacheView {
   void saveMovieOf(MovieKind kind);
   void copyLater(MovieKind what) { copy_requested_ = what; }
   void moveCamera(Command command);
+  void lookAsAtFirst();
 
   ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
   void setBounds();
@@ -210,6 +211,8 @@ class CacheView {
   FileDialog& dialog_;
   ViewState state_;
   const EditedFunction first_function_;
+  const Camera first_camera_;  // PreparedView's
+  const ImageSize first_size_;
   const std::string first_state_;  // as JSON; empty if it was another view's, which somebody had changed
   History history_;
   Panels panels_;

@@ -11,6 +11,7 @@
 #include "tools/view/edited_function.h"
 #include "tools/view/first_view.h"
 #include "tools/viewer/cache_view.h"
+#include "tools/viewer/navigation.h"
 
 namespace curvisplat {
 namespace {
@@ -53,6 +54,7 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
          v.chooser_.ask({FunctionChooser::For::kSameScalar, v.state_.variable});
        }},
       {Command::kSaveView, [](View& v) { v.saveView(fmt::format("view {}", v.views_.size() + 1)); }},
+      {Command::kFirstView, [](View& v) { v.lookAsAtFirst(); }},
       {Command::kOtherProjection, [](View& v) { v.moveCamera(Command::kOtherProjection); }, nullptr,
        [](const View& v) { return v.state_.camera.projection == Projection::kPerspective; }},
       {Command::kFly, [](View& v) { v.moveCamera(Command::kFly); }, nullptr,
@@ -171,6 +173,20 @@ void CacheView::saveMovieOf(MovieKind kind) {
   };
   const char* const ending = encodes_movies_ ? ".mp4" : ".html";
   dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ending, std::move(offer));
+}
+
+/// Looks as at the beginning, before anything was turned, in this window or in one before it.
+void CacheView::lookAsAtFirst() {
+  constexpr double kAsWide = 0.97;  // bars with text of the panels' size are a little wider or narrower
+  const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
+  const bool fits = aspect(data_size_) > kAsWide * aspect(first_size_);
+  state_.camera = fits ? first_camera_ : holding(first_camera_, first_size_, data_size_);
+  if (state_.scale != glm::dvec3(1.0))
+    state_.camera =
+        refitted(state_.camera, state_.scale * manifest().lower, state_.scale * manifest().upper, data_size_);
+  fitted_width_ = data_size_.width;
+  film_.stop();
+  changed_ = true;
 }
 
 void CacheView::moveCamera(Command command) {

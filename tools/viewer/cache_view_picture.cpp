@@ -239,7 +239,7 @@ void CacheView::savePictureIfFinal() {
     const ShownFunctions functions(state_, manifest());
     const AnnotatedScene scene =
         sceneOf(state_, functions, *shown_, picture_size_, globe_grid_.boxOf(state_, cache_));
-    writeImage(annotated(shown_->image, state_.annotations, scene), file);
+    writeImage(annotated(shown_->image, savedAnnotations(state_), scene), file);
     reports_.settle(About::kSaving);
     say("saved " + fs::absolute(file).string() +
         (preview_ ? fmt::format(", of the preview ({})", preview_->what) : "") + lacks());

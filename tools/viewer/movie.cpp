@@ -14,6 +14,7 @@
 #include "stream/base/error.h"
 #include "stream/base/os.h"
 #include "stream/base/text.h"
+#include "tools/view/background_jobs.h"
 #include "tools/view/picture_layout.h"
 
 namespace curvisplat {
@@ -85,7 +86,7 @@ class MovieFrames {
     drawn.image = drawWithEnough(player_->renderer(), camera, options_, drawn.statistics, of_frame);
     const AnnotatedScene shown =
         sceneOf(state_, *functions_, drawn, size_, globe_grid_.boxOf(state_, movie_.cache));
-    return annotated(std::move(drawn.image), state_.annotations, shown);
+    return annotated(std::move(drawn.image), savedAnnotations(state_), shown);
   }
 
  private:
@@ -169,8 +170,8 @@ std::filesystem::path drawMovie(MovieRequest& movie, const OpenMovieOutput& open
   MovieFrames pictures(movie, size, progress);
   const std::unique_ptr<MovieOutput> output =
       is_picture ? std::make_unique<OnePicture>(file) : open(file, size, movie.frames_per_s);
-  is_picture ? progress.begin("drawing the picture", 1, "picture")
-             : progress.begin("drawing frames", frames, "frames");
+  is_picture ? progress.begin("drawing the picture", 1, kPicturesUnit)
+             : progress.begin("drawing pictures", frames, kPicturesUnit);
   for (uint64_t frame = 0; frame < frames; ++frame) {
     output->write(frame, pictures.draw(frame));
     progress.advance(1);

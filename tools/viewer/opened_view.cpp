@@ -4,11 +4,14 @@
 #include <imgui.h>
 
 #include <exception>
+#include <string_view>
 #include <utility>
 
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 #include "stream/base/threads.h"
 #include "tools/view/background_jobs.h"
+#include "tools/view/saved_views.h"
 #include "tools/window/reports.h"
 #include "tools/window/widgets.h"
 
@@ -23,7 +26,7 @@ bool JobDisplay::draw(const BackgroundJob& job, const std::string& name, const s
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_AlwaysAutoResize);
   window_.coverCurrent();
-  ImGui::TextUnformatted(job.title().c_str());
+  ImGui::TextWrapped("%s", job.title().c_str());
   if (!note.empty()) ImGui::TextDisabled("%s", note.c_str());
   // Dear ImGui's yellow leaves white letters unread.
   ImGui::PushStyleColor(ImGuiCol_PlotHistogram, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
@@ -42,6 +45,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kMaxTitle = 60;
+constexpr std::string_view kLacksValues = "have no value of";  // of an error of preprocess/addition
+
+/// The command that makes a cache of all scalars and one that is computed.
+std::string conversionWith(const std::string& scalar, const std::vector<fs::path>& files) {
+  std::string command = "curvisplat convert";
+  for (const fs::path& file : files) command += " " + shellWord(shortPath(file).string());
+  const std::string cache = fmt::format("{}_{}.splats", files.front().stem().string(), scalar);
+  return command + " -o " + shellWord(cache) + " --scalar " + shellWord("all," + scalar);
+}
 
 }  // namespace
 
@@ -215,6 +227,16 @@ void OpenedView::takeWhole() {
     if (options.carried) options.scalar.reset();  // the user has chosen since
     show(*preparation->prepared, options, opening_files_);
   } catch (const Interrupted&) {
+  } catch (const Error& error) {
+    const std::string text = error.what();
+    if (!adds_to_ || !view_ || text.find(kLacksValues) == text.npos)
+      return surroundings_.reports.report(error, About::kOpening);
+    surroundings_.reports.report(
+        fmt::format(
+            "{0} cannot be added: not all samples have it. A terminal makes a cache with it, to be opened "
+            "here: {1}",
+            adds_to_->name, conversionWith(adds_to_->name, view_->sources())),
+        About::kOpening);
   } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
     surroundings_.reports.report(error, About::kOpening);
   }

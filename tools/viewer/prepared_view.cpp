@@ -92,6 +92,8 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   if (options.given && options.given->above)
     state.camera =
         cameraAbove(*options.given->above, state.scale, dataSizeOf(state, cache.manifest(), picture));
+  const Camera first_camera = state.camera;
+  const ImageSize first_size = dataSizeOf(state, cache.manifest(), picture);
   const std::string scalar = state.variable;
   const EditedFunction automatic = state.function;
   const fs::path& whole = options.preview ? options.preview->whole : cache.cachePath();
@@ -115,8 +117,8 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   if (options.faces.names) faces = options.faces.names(cache);
   std::vector<std::string> elsewhere = scalarsElsewhere(cache);
   std::optional<Film> film = rememberedFilm(whole);
-  return {std::move(cache), std::move(state),     scalar,         automatic,
-          std::move(faces), std::move(elsewhere), std::move(film)};
+  return {std::move(cache), std::move(state), first_camera,         first_size,     scalar,
+          automatic,        std::move(faces), std::move(elsewhere), std::move(film)};
 }
 
 }  // namespace curvisplat

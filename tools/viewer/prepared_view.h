@@ -64,6 +64,8 @@ struct ViewerOptions {
 struct PreparedView {
   CacheReader cache;
   ViewState state;
+  Camera first_camera;  // for a picture whose data have this size, without --scale
+  ImageSize first_size;
   std::string scalar;                   // for which
   EditedFunction automatic;             // was chosen from the data
   std::vector<std::string> face_names;  // that the list of surfaces offers

@@ -66,6 +66,10 @@ Look lookOf(FileDialog::Purpose purpose) {
 /// Whether a file can be of these endings: names without an ending and numbers, as those of steps and processors, can be
 /// any. Letters may be large or small.
 bool fits(fs::path name, const std::vector<std::string>& endings) {
+  // Texts of programs and repositories are no data.
+  for (const char* text : {"LICENSE", "LICENCE", "COPYING", "README", "AUTHORS", "NOTICE", "INSTALL", "NEWS",
+                           "CHANGELOG", "TODO", "Makefile", "Dockerfile", "Allrun", "Allclean"})
+    if (name == text) return false;
   for (const char* compressed : {".gz", ".xz", ".zst"})
     if (name.extension() == compressed) name = name.stem();
   std::string ending = name.extension().string();
@@ -200,7 +204,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     ImGui::SameLine();
   }
   if (error_.empty() && *purpose_ == Purpose::kOpenData)
-    ImGui::TextDisabled("Ctrl + click takes several: a grid and its solutions");
+    ImGui::TextDisabled("Ctrl or Shift + click takes several: a grid and its solutions");
   else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
     ImGui::TextDisabled("%s",
                         movie_.has_encoder
@@ -245,7 +249,10 @@ void FileDialog::drawHelp(bool saves) const {
     row("Esc", "shows the files again; there, closes the dialog");
     row("click", "chooses a file");
     row("double click", saves ? "saves under its name; enters a folder" : "opens a file; enters a folder");
-    if (*purpose_ == Purpose::kOpenData) row("Ctrl + click", "chooses several: a grid and its solutions");
+    if (*purpose_ == Purpose::kOpenData) {
+      row("Ctrl + click", "chooses several: a grid and its solutions");
+      row("Shift + click", "chooses all from the chosen one to this one");
+    }
     row("F1", "shows the files again");
     ImGui::EndTable();
   }
@@ -331,7 +338,9 @@ void FileDialog::drawEntries(bool& accepts) {
       continue;
     }
     std::vector<std::string> names{entry.name};
-    if (ImGui::GetIO().KeyCtrl && *purpose_ == Purpose::kOpenData && !twice) {
+    if (ImGui::GetIO().KeyShift && *purpose_ == Purpose::kOpenData && !twice && !taken_.empty()) {
+      names = filesBetween(taken_.front(), entry.name);
+    } else if (ImGui::GetIO().KeyCtrl && *purpose_ == Purpose::kOpenData && !twice) {
       names = taken_;
       if (std::erase(names, entry.name) == 0) names.push_back(entry.name);
     }
@@ -340,6 +349,20 @@ void FileDialog::drawEntries(bool& accepts) {
   }
   ImGui::EndChild();
   if (entered) enter(*entered);
+}
+
+/// The files of the list from `first` to `last`, whichever comes first there; `first` begins what is returned.
+std::vector<std::string> FileDialog::filesBetween(const std::string& first, const std::string& last) const {
+  const auto at = [&](const std::string& name) {
+    return std::ranges::find(entries_, name, &FolderEntry::name) - entries_.begin();
+  };
+  const auto from = at(first), to = at(last), count = static_cast<ptrdiff_t>(entries_.size());
+  std::vector<std::string> names;
+  if (from < count)
+    for (auto n = from; n != to + (to < from ? -1 : 1); n += to < from ? -1 : 1)
+      if (const FolderEntry& entry = entries_[static_cast<size_t>(n)]; !entry.is_folder)
+        names.push_back(entry.name);
+  return names.empty() ? std::vector{last} : names;
 }
 
 void FileDialog::select(std::vector<std::string> names) {

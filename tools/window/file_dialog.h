@@ -80,6 +80,7 @@ class FileDialog {
   float heightBelow() const;
   void drawHelp(bool saves) const;
   void drawEntries(bool& accepts);
+  std::vector<std::string> filesBetween(const std::string& first, const std::string& last) const;
   void select(std::vector<std::string> names);
   bool isTaken(const std::string& name) const;
   std::optional<Chosen> accept();

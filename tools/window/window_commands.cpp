@@ -41,6 +41,7 @@ constexpr std::array kCommands{
                 kGroup},
     CommandInfo{Command::kRemoveMarkers, "Edit", "Remove all markers"},
     CommandInfo{Command::kFit, "View", "Fit data into the picture", GLFW_KEY_R, !kShift, !kControl, "R"},
+    CommandInfo{Command::kFirstView, "View", "First view", GLFW_KEY_R, kShift, !kControl, "Shift+R"},
     CommandInfo{Command::kLookPlusX, "View", "From +x", GLFW_KEY_X, !kShift, !kControl, "X", kGroup},
     CommandInfo{Command::kLookMinusX, "View", "From -x", GLFW_KEY_X, kShift, !kControl, "Shift+X"},
     CommandInfo{Command::kLookPlusY, "View", "From +y", GLFW_KEY_Y, !kShift, !kControl, "Y"},

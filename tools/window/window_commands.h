@@ -32,6 +32,7 @@ enum class Command {
   kUndo,
   kRedo,
   kResetFunction,
+  kFirstView,
   kFit,  // this and the sides to look from fit the data into the picture
   kLookPlusX,
   kLookMinusX,
