@@ -111,7 +111,7 @@ void useOwnPeak(Forecast& forecast, const GridDescription& whole, const GridDesc
   if (nodesOf(whole) == nodesOf(sample)) forecast.memory_bytes = ProcessUsage::now().peak_memory_bytes;
 }
 
-/// Of `steps` time steps, whose points and cells are those of the first: each adds values alone.
+/// Forecasts the conversion of `steps` time steps, whose points and cells are those of the first: each adds values alone.
 Forecast forecastOfMesh(const MeshSource& mesh, const ConvertOptions& options, uint64_t steps) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   Forecast forecast;
