@@ -232,6 +232,7 @@ json jsonOf(const ScatteredSplats& splats) {
                     {"degenerate", splats.counts.degenerate},
                     {"inverted", splats.counts.inverted},
                     {"halved", splats.counts.halved},
+                    {"hanging", splats.counts.hanging},
                     {"overlap", splats.overlap},
                     {"merged_nodes", splats.merged_nodes},
                     {"sample", splats.sample_file},
@@ -244,7 +245,8 @@ json jsonOf(const ScatteredSplats& splats) {
 ScatteredSplats splatsOf(const JsonField& from) {
   ScatteredSplats splats;
   splats.survey = surveyOf(from.at("survey"));
-  splats.counts = {from.at("degenerate").count(), from.at("inverted").count(), from.at("halved").count()};
+  splats.counts = {from.at("degenerate").count(), from.at("inverted").count(), from.at("halved").count(),
+                   from.at("hanging").count()};
   splats.overlap = from.at("overlap").text();
   splats.merged_nodes = from.at("merged_nodes").count();
   splats.sample_file = from.at("sample").text();

@@ -37,6 +37,7 @@ void MeshOrigin::follow(const Manifest& cache) {
       cache.isMesh() && cache.cells && centring() == Centring::kCell && cache.blocks[0].nk == 2;
   slabs_ = halved ? SlabCells::kHalved : SlabCells::kWhole;
   blocks_.front().nk = halved ? 2 : 1;
+  hanging_ = cache.stretch == kHangingNodes ? HangingNodes::kFitted : HangingNodes::kAsOthers;
 }
 
 TemporaryNeeds MeshOrigin::needsBy(const NeedsOf& needs_of) const {
@@ -142,12 +143,12 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
   } else {
     PointSums sums(reader_.points(), drawn_cells_, reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { sums.add(cells); });
-    counts = sums.finish(take, progress);
+    counts = sums.finish(take, hanging_, progress);
   }
   if (counts.splats == 0)
     throw NothingToDraw("{}: every cell has a blanked point: there is nothing to draw",
                         description().files.empty() ? description().format : description().files.front());
-  return {counts.degenerate, 0, counts.halved};
+  return {counts.degenerate, 0, counts.halved, counts.hanging};
 }
 
 uint64_t MeshOrigin::finish(const SinkOfThread&, Progress&) {

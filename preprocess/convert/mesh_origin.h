@@ -36,7 +36,8 @@ class MeshOrigin final : public SplatOrigin {
   MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
              const MemoryPlan& plan, ScratchFiles scratch);
 
-  /// Makes splats as those of a cache were made: of cells between two faces one or two, by what its block says.
+  /// Makes splats as those of a cache were made: of cells between two faces one or two, by what its block says; of points where
+  /// nodes hang by Manifest::stretch.
   void follow(const Manifest& cache);
 
   const GridDescription& description() const override { return reader_.source().description(); }
@@ -66,6 +67,7 @@ class MeshOrigin final : public SplatOrigin {
   const MeshSource::Preparation preparation_;
   std::vector<GridBlock> blocks_;
   SlabCells slabs_ = SlabCells::kHalved;
+  HangingNodes hanging_ = HangingNodes::kFitted;
   std::optional<PointNumbers> numbers_;
   std::vector<bool> used_;  // [point]: a cell that is drawn has it
   uint64_t drawn_cells_ = 0, unused_points_ = 0, chunk_bytes_ = 0;

@@ -107,9 +107,17 @@ OuterPlanes::OfRange OuterPlanes::load(size_t range) {
   OfRange planes = sorted(range);
   file_.forget(range);
   std::erase_if(planes.records_, [&](const OfRange::Record& record) {
-    return std::binary_search(closed_.begin(), closed_.end(), record.face);
+    if (!std::binary_search(closed_.begin(), closed_.end(), record.face)) return false;
+    std::vector<uint64_t>& numbers = planes.at_closed_;
+    if (record.touches != 0 && (numbers.empty() || numbers.back() != record.number))
+      numbers.push_back(record.number);
+    return true;
   });
   return planes;
+}
+
+bool OuterPlanes::OfRange::isAtClosed(uint64_t number) const {
+  return std::binary_search(at_closed_.begin(), at_closed_.end(), number);
 }
 
 std::span<const OuterPlane> OuterPlanes::OfRange::of(uint64_t number,

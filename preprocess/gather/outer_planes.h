@@ -38,6 +38,8 @@ class OuterPlanes {
    public:
     /// The planes of the splat `number`. Any thread; `scratch` keeps its capacity.
     std::span<const OuterPlane> of(uint64_t number, std::vector<OuterPlane>& scratch) const;
+    /// Whether a face of the splat was left out since another one lies against it. Any thread.
+    bool isAtClosed(uint64_t number) const;
 
    private:
     friend class OuterPlanes;
@@ -45,7 +47,8 @@ class OuterPlanes {
       uint64_t number, touches, face;
       std::array<double, 3> inward, point;
     };
-    std::vector<Record> records_;  // by number
+    std::vector<Record> records_;      // by number
+    std::vector<uint64_t> at_closed_;  // numbers, rising
   };
   OfRange load(size_t range);
 

@@ -207,17 +207,16 @@ void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) 
   }
 }
 
-void PointSums::flushRange(const PointRange& range, const OuterPlanes::OfRange& planes, const TakeSplat& take,
-                           Counts& counts) {
+void PointSums::flushRange(const RangeOfSplats& range, const TakeSplat& take, Counts& counts) {
   const size_t stride = momentCount(fields_);
-  std::atomic<uint64_t> splats = 0, degenerate = 0;
-  parallelFor(tbb::blocked_range<uint64_t>(range.first, range.end, 1024),
+  std::atomic<uint64_t> splats = 0, degenerate = 0, hanging = 0;
+  parallelFor(tbb::blocked_range<uint64_t>(range.points.first, range.points.end, 1024),
               [&](const tbb::blocked_range<uint64_t>& part) {
                 const TraceScope trace("splats of points");
                 NodeSplat splat;
                 std::vector<SplatScalar> values(fields_);
                 std::vector<OuterPlane> of_point;
-                uint64_t made = 0, flat = 0;
+                uint64_t made = 0, flat = 0, fitted = 0;
                 for (uint64_t point = part.begin(); point < part.end(); ++point) {
                   const double* const sums = sums_->sums(point);
                   if (std::isnan(sums[0])) continue;
@@ -225,15 +224,22 @@ void PointSums::flushRange(const PointRange& range, const OuterPlanes::OfRange& 
                   if (!(moments[0] > 0)) ++flat;
                   splatOfPoint(point, {{sums[0], sums[1], sums[2]}, {sums_->values(point), fields_}, moments},
                                splat, values);
-                  splat.border_code = meshBorderCode(planes.of(point, of_point), splat.splat, kNextOfPoints);
+                  const std::span<const OuterPlane> outer = range.planes.of(point, of_point);
+                  if (range.hanging == HangingNodes::kFitted && range.planes.isAtClosed(point)) {
+                    fitAtHangingNode(outer, splat, values);
+                    ++fitted;
+                  }
+                  splat.border_code = meshBorderCode(outer, splat.splat, kNextOfPoints);
                   take(splat, values);
                   ++made;
                 }
                 splats += made;
                 degenerate += flat;
+                hanging += fitted;
               });
   counts.splats += splats;
   counts.degenerate += degenerate;
+  counts.hanging += hanging;
 }
 
 void PointSums::sumWaiting(size_t stream, const PointRange& range, const Progress& progress) {
@@ -264,7 +270,7 @@ void PointSums::sumWaiting(size_t stream, const PointRange& range, const Progres
   waiting_->forget(stream);
 }
 
-PointSums::Counts PointSums::finish(const TakeSplat& take, const Progress& progress) {
+PointSums::Counts PointSums::finish(const TakeSplat& take, HangingNodes hanging, const Progress& progress) {
   Counts counts;
   borders_->finish(progress);
   if (waiting_) waiting_->close();
@@ -277,7 +283,7 @@ PointSums::Counts PointSums::finish(const TakeSplat& take, const Progress& progr
     const uint64_t first_page = range.first / kPoints, end_page = (range.end + kPoints - 1) / kPoints;
     sums_->holdPages(first_page, end_page);
     if (waiting_) sumWaiting(stream, range, progress);
-    flushRange(range, borders_->load(stream), take, counts);
+    flushRange({range, borders_->load(stream), hanging}, take, counts);
     for (uint64_t page = first_page; page < end_page; ++page) sums_->forget(page);
   }
   sums_.reset();

@@ -20,6 +20,9 @@ namespace curvisplat {
 /// Takes a splat and its values, one for each field. Several threads call it at once.
 using TakeSplat = std::function<void(const NodeSplat&, std::span<const SplatScalar>)>;
 
+/// Whether splats of points are fitted where nodes hang, by fitAtHangingNode(). Earlier programs did not.
+enum class HangingNodes { kAsOthers, kFitted };
+
 class PointSums {
  public:
   /// `points`: how many points there are; their numbers are less. `cells`: about how many cells will be
@@ -46,10 +49,11 @@ class PointSums {
     uint64_t splats = 0;
     uint64_t degenerate = 0;  // points whose cells have no volume: their splats have no weight
     uint64_t halved = 0;      // cells that became two splats
+    uint64_t hanging = 0;     // points that were fitted where nodes hang
   };
   /// Makes the splats and passes each to `take`. Call it once, after all cells have been added. Throws Error
   /// if the disk fails, Interrupted once `progress` is stopped.
-  Counts finish(const TakeSplat& take, const Progress& progress);
+  Counts finish(const TakeSplat& take, HangingNodes hanging, const Progress& progress);
 
  private:
   struct PointRange {
@@ -60,8 +64,12 @@ class PointSums {
   void accumulate(const GatheredCells& cells, const PointRange& range);
   void write(const GatheredCells& cells);
   void sumWaiting(size_t stream, const PointRange& range, const Progress& progress);
-  void flushRange(const PointRange& range, const OuterPlanes::OfRange& planes, const TakeSplat& take,
-                  Counts& counts);
+  struct RangeOfSplats {
+    PointRange points;
+    OuterPlanes::OfRange planes;
+    HangingNodes hanging;
+  };
+  void flushRange(const RangeOfSplats& range, const TakeSplat& take, Counts& counts);
 
   const uint64_t points_;
   const size_t fields_;

@@ -296,7 +296,7 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
   } else {
     PointSums sums(reader.points(), reader.cells(), fields, half, scratch_);
     gather.forEach([&](const GatheredCells& some) { sums.add(some); });
-    sums.finish(take, progress);
+    sums.finish(take, HangingNodes::kAsOthers, progress);
   }
   for (Run& run : runs)
     if (!run.values.empty()) values->put(run.first, std::move(run.values));

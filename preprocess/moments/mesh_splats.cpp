@@ -225,7 +225,48 @@ VoxelPlanes joined(std::span<const OuterPlane> planes, bool touching) {
   return found;
 }
 
+/// The projection onto the directions along all outer faces that a splat ends at.
+glm::dmat3 alongFaces(std::span<const OuterPlane> outer) {
+  glm::dmat3 along(1.0);
+  const Directions directions = directionsOf(outer, true);
+  for (const VoxelPlanes::Plane& plane : directions.all()) {
+    const glm::dvec3 rest = along * plane.inward;
+    const double square = glm::dot(rest, rest);
+    constexpr double kNew = 0.01;  // of the square of a normal: less is what earlier faces have left out
+    if (square > kNew) along -= glm::outerProduct(rest, rest) / square;
+  }
+  return along;
+}
+
 }  // namespace
+
+void fitAtHangingNode(std::span<const OuterPlane> outer, NodeSplat& of_point, std::span<SplatScalar> values) {
+  Splat& splat = of_point.splat;
+  if (!(splat.weight > 0)) return;
+  const glm::dmat3 along = outer.empty() ? glm::dmat3(1.0) : alongFaces(outer);
+  const glm::dvec3 aside = along * (splat.position - of_point.node_position);
+  const glm::dvec3 in_cells = inFrameOf(splat, aside);
+  const double square = std::min(glm::dot(in_cells, in_cells), kMostAside);
+  const double one = std::clamp((square - kBothSidesUpTo) / (kOneSideFrom - kBothSidesUpTo), 0.0, 1.0);
+  const auto mixed = [&](double of_one_side, double of_both) {
+    return one * of_one_side + (1 - one) * of_both;
+  };
+  const double scale = square * mixed(kFitOfOneSide.scale, kFitOfBothSides.scale);
+  const double blur = 12 * mixed(kFitOfOneSide.blur * square, kFitOfBothSides.blur);
+  const double shift = mixed(std::min(kFitOfOneSide.shift * square, 1.0), kFitOfBothSides.shift);
+  const Splat before = splat;
+  const glm::dmat3 wider = glm::dmat3(1.0) + (std::exp(0.5 * scale) - 1) * along;
+  const glm::dmat3 factor = wider * splat.factor();
+  const glm::dmat3 shape = factor * glm::transpose(factor) + blur * glm::outerProduct(aside, aside);
+  setShape(splat, {shape[0][0], shape[0][1], shape[1][1], shape[0][2], shape[1][2], shape[2][2]},
+           smallestAxis(splat.position));
+  splat.position -= shift * aside;
+  for (SplatScalar& value : values) {
+    const glm::dvec3 gradient = gradientOf(before, value.slope);
+    value.mean -= shift * glm::dot(gradient, aside);
+    value.slope = gradient * splat.factor();
+  }
+}
 
 bool halveSlab(std::span<const OuterPlane> planes, const NodeSplat& whole,
                std::span<const SplatScalar> values, std::array<SlabHalf, 2>& halves) {

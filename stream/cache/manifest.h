@@ -99,6 +99,8 @@ inline constexpr const char* kSteepStretch = "steep";  // by StretchFit::kSteep 
 /// Steep as well, and splats weigh as much as their dual cells (preprocess/splats/dual_cell.h), collapsed
 /// ones have their shape, and rows go on across joints (preprocess/seams/joined_rows.h).
 inline constexpr const char* kDualCells = "dual-cells";
+/// Splats of a mesh's points are fitted where nodes hang (preprocess/moments/mesh_splats.h).
+inline constexpr const char* kHangingNodes = "hanging-nodes";
 
 /// The contents of manifest.json.
 struct Manifest {
@@ -122,7 +124,7 @@ struct Manifest {
   /// is not known.
   std::string overlap;
   std::string
-      stretch;  // how splats are made where cells grow: kDualCells, kSteepStretch; empty: by StretchFit::kGentle
+      stretch;  // how splats are made where cells grow: kDualCells, kSteepStretch, kHangingNodes; empty: by StretchFit::kGentle
   bool isSteep() const { return stretch == kSteepStretch || stretch == kDualCells; }
   std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
                                           // their geometry (preprocess/survey/grid_survey.h)

@@ -32,6 +32,17 @@ inline constexpr float kSkewOfGrowth = 0.9f;
 /// cell's lengths, for e = 1, and what the length loses, as a share of it.
 inline constexpr double kWidthDrift = 0.12, kWidthShare = 0.13;
 
+/// [no script] Splats of a mesh's points where faces of cells do not fit together, since nodes hang (preprocess/moments/mesh_splats.h).
+/// The way from the point to the splat's middle is m, and κ = mᵀ S⁻¹ m. Points of one side alone have κ = 1/4 and more: S becomes
+/// S e^(scale κ) + 12 blur κ m mᵀ, and m becomes m (1 - shift κ). Points of both sides have less: there blur and shift stand
+/// without κ.
+struct HangingFit {
+  double scale, blur, shift;
+};
+inline constexpr HangingFit kFitOfOneSide{1.7, 1.53, 2.2}, kFitOfBothSides{-1.25, 0.41, -0.2};
+/// The first fit takes over from the second between two κ, and the third is the largest that counts.
+inline constexpr double kBothSidesUpTo = 0.18, kOneSideFrom = 0.22, kMostAside = 0.5;
+
 /// [no script] The share of a whole cell's stretch, s - 1, that a half cell at a border has.
 inline constexpr double kStretchAtBorder = 0.62;
 

@@ -1,8 +1,11 @@
 // Moments of four cells at once are those of each cell, bit for bit. Which outer faces at a point splats end
-// at.
+// at; and the splats of points at which nodes hang.
 #include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -11,6 +14,7 @@
 
 #include "preprocess/gather/outer_planes.h"
 #include "preprocess/moments/cell_moments.h"
+#include "preprocess/moments/mesh_splats.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -133,7 +137,13 @@ size_t keptOf(const std::vector<OuterPlane>& faces) {
   planes.close();
   planes.leaveOutClosed(Progress());
   std::vector<OuterPlane> scratch;
-  return planes.load(0).of(kPoint, scratch).size();
+  const OuterPlanes::OfRange kept = planes.load(0);
+  const size_t count = kept.of(kPoint, scratch).size();
+  const bool any_touching =
+      std::any_of(faces.begin(), faces.end(), [](const OuterPlane& plane) { return plane.touches; });
+  EXPECT_EQ(kept.isAtClosed(kPoint), any_touching && count < faces.size());
+  EXPECT_FALSE(kept.isAtClosed(kPoint + 1));
+  return count;
 }
 
 /// The unit squares on both sides of a wedge, at a point of its edge.
@@ -171,6 +181,43 @@ TEST(OuterPlanes, AreNotComparedAfterAStop) {
   Progress progress;
   progress.stop(2);
   EXPECT_THROW(planes.leaveOutClosed(progress), Interrupted);
+}
+
+TEST(HangingNodes, KeepTheirLengthsAcrossOuterFaces) {
+  // Beside a face at z = 0, and across one at x = 1 that does not fit: the splat of a fine cell's quarter. The scalar is linear.
+  const glm::dvec3 gradient(3, -2, 5), point(1, 0.5, 0);
+  constexpr double kFine = 0.125;
+  const auto before = [&] {
+    NodeSplat splat;
+    splat.node_position = point;
+    splat.splat = {point + 0.25 * kFine * glm::dvec3(1, 0, 1),
+                   {0.5 * kFine, kFine, 0.5 * kFine},
+                   {},
+                   0.25 * kFine * kFine * kFine};
+    return splat;
+  };
+  NodeSplat splat = before();
+  const auto scalarAt = [&](const NodeSplat& of) { return glm::dot(gradient, of.splat.position); };
+  std::array<SplatScalar, 1> values{{{scalarAt(splat), gradient * splat.splat.factor(), 0}}};
+  const std::array<OuterPlane, 1> outer{{{glm::dvec3(0, 0, 0.1), point}}};
+  fitAtHangingNode(outer, splat, values);
+  EXPECT_DOUBLE_EQ(splat.splat.weight, before().splat.weight);
+  EXPECT_NEAR(splat.splat.position.z, before().splat.position.z, 1e-12);
+  EXPECT_NEAR(splat.splat.axis[2], 0.5 * kFine, 1e-12);
+  // Nearer to the face, and about as thick as a whole cell.
+  EXPECT_GT(splat.splat.position.x, 1);
+  EXPECT_LT(splat.splat.position.x, 1 + 0.2 * kFine);
+  EXPECT_GT(splat.splat.axis[0], 0.75 * kFine);
+  EXPECT_LT(splat.splat.axis[0], 1.1 * kFine);
+  // The scalar is what it was.
+  EXPECT_NEAR(values[0].mean, scalarAt(splat), 1e-12);
+  EXPECT_LT(glm::distance(values[0].slope, gradient * splat.splat.factor()), 1e-12);
+
+  NodeSplat flat = before();
+  flat.splat.weight = 0;
+  fitAtHangingNode(outer, flat, values);
+  EXPECT_EQ(flat.splat.position, before().splat.position);
+  EXPECT_EQ(flat.splat.axis, before().splat.axis);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
@@ -142,6 +143,17 @@ class MeshAddition : public testing::Test {
     return convertSeries(input, options, progress, [](const SeriesEvent&) {});
   }
 
+  /// A cube of n x n x n cells, from `x` to x + 1 along x.
+  ArrayPiece unitBox(double x, uint64_t n) const {
+    ArrayPiece box = hexahedraOf(*scene_, n, n, n);
+    for (uint64_t point = 0; point < box.points.size(); ++point)
+      box.points[point] = glm::dvec3(x, 0, 0) +
+                          glm::dvec3(point % (n + 1), point / (n + 1) % (n + 1), point / (n + 1) / (n + 1)) /
+                              static_cast<double>(n);
+    setValues(box, [](const glm::dvec3& at) { return at.x * at.y + at.z; });
+    return box;
+  }
+
   const std::shared_ptr<const Scene> scene_ = makeScene("half-annulus");
   const ArrayPiece tetrahedra_ = tetrahedraOf(*scene_, 16, 8, 8), hexahedra_ = hexahedraOf(*scene_, 16, 8, 8);
   const TemporaryFolder folder_;
@@ -182,6 +194,24 @@ TEST_F(MeshAddition, OnlyWhatTheCacheDrawsNeedsTheScalar) {
     expectAddition({holes}, cells);
     expectAddition(split(holes, 2, [](size_t cell) { return cell < 500 ? 0 : 1; }), cells);
   }
+}
+
+TEST_F(MeshAddition, HangingNodesAreFittedAsTheCacheIs) {
+  const std::vector<ArrayPiece> joint{unitBox(0, 4), unitBox(1, 8)};
+  expectAddition(joint, false);
+  const TwoOfEach source(joint);
+  const auto cache = convertAt(source, "fitted", {0});
+  EXPECT_EQ(CacheReader(cache).manifest().stretch, kHangingNodes);
+  EXPECT_EQ(CacheReader(convertAt(TwoOfEach({hexahedra_}), "none", {0})).manifest().stretch, "");
+  // A cache of an earlier program is expected to have splats as they come from dual cells, which lie elsewhere.
+  Manifest manifest = CacheReader(cache).manifest();
+  manifest.stretch = "";
+  std::ofstream(cache / "manifest.json", std::ios::binary) << manifest.toJson();
+  AddScalarOptions options;
+  options.cache = cache;
+  options.scalars = {2};
+  Progress progress;
+  expectSays(curvisplat::errorOf([&] { addScalars(source, options, progress); }), "another position");
 }
 
 TEST_F(MeshAddition, AnotherMeshIsRefused) {

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <map>
 #include <memory>
 #include <optional>
@@ -264,7 +266,7 @@ ArrayPiece boxes(std::initializer_list<uint64_t> cells) {
   return all;
 }
 
-/// Converts the scalar at points, and calls use(position, border code) for each splat of the finest level.
+/// Converts the scalar at points, and calls use(position, geometry, n) for each splat of the finest level.
 template <typename Use>
 void forEachSplat(const ArrayPiece& piece, const std::filesystem::path& folder, const Use& use) {
   ConvertOptions options;
@@ -280,13 +282,14 @@ void forEachSplat(const ArrayPiece& piece, const std::filesystem::path& folder, 
     cache.readGeometry(number, geometry);
     const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[number].cell);
     for (size_t n = 0; n < geometry.size(); ++n)
-      use(corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]), geometry.border_code[n]);
+      use(corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]), geometry, n);
   }
 }
 
 TEST_F(MeshBorders, HangingNodesAreInside) {
   size_t inside = 0, cut = 0;
-  forEachSplat(boxes({8, 16}), folder_.path(), [&](const glm::dvec3& x, uint32_t border_code) {
+  forEachSplat(boxes({8, 16}), folder_.path(), [&](const glm::dvec3& x, const SplatGeometry& of, size_t n) {
+    const uint32_t border_code = of.border_code[n];
     const double edge = std::min({x.x, 2 - x.x, x.y, 1 - x.y, x.z, 1 - x.z});
     if (edge < 0.02) {
       ++cut;
@@ -298,6 +301,42 @@ TEST_F(MeshBorders, HangingNodesAreInside) {
   });
   EXPECT_GT(inside, 100u);
   EXPECT_GT(cut, 500u);
+}
+
+/// DESIGN.md's kernel.
+double kernelAt(double r) {
+  if (r < 0.889392) return 0.557526 + r * r * (-1.157743 + 0.671033 * r);
+  const double rest = std::max(0.0, 1.556228 - r);
+  return rest * rest * (0.067599 + 0.282474 * rest);
+}
+
+TEST_F(MeshBorders, AMediumIsEvenAroundHangingNodes) {
+  // Cells of 1/8 and 1/16: the mean density over two coarse cells along y and z, at places along x.
+  constexpr int kAlong = 40, kAcross = 8;
+  std::array<double, kAlong> density{};
+  const auto placeAt = [](int i) { return 0.75 + 0.5 * (i + 0.5) / kAlong; };
+  size_t splats = 0;
+  forEachSplat(boxes({8, 16}), folder_.path(), [&](const glm::dvec3& x, const SplatGeometry& of, size_t n) {
+    constexpr double kReach = 0.25;
+    if (std::abs(x.x - 1) > 0.25 + kReach) return;
+    ++splats;
+    const Splat splat{
+        x, {of.axis0[n], of.axis1[n], of.axis2[n]}, {of.shear10[n], of.shear20[n], of.shear21[n]}, 1};
+    const glm::dmat3 inverse = glm::inverse(splat.factor());
+    const double height = of.weight[n] / (splat.axis[0] * splat.axis[1] * splat.axis[2]);
+    for (int i = 0; i < kAlong; ++i)
+      for (int j = 0; j < kAcross; ++j)
+        for (int k = 0; k < kAcross; ++k) {
+          const glm::dvec3 at(placeAt(i), 0.375 + 0.25 * (j + 0.5) / kAcross,
+                              0.375 + 0.25 * (k + 0.5) / kAcross);
+          density[static_cast<size_t>(i)] +=
+              height * kernelAt(glm::length(inverse * (at - x))) / (kAcross * kAcross);
+        }
+  });
+  EXPECT_GT(splats, 2000u);
+  // In one dimension from 0.98 to 1.03; of dual cells as they are, from 0.89 to 1.33.
+  for (int i = 0; i < kAlong; ++i)
+    EXPECT_NEAR(density[static_cast<size_t>(i)], 1, 0.05) << "at " << placeAt(i);
 }
 
 /// The scene in hexahedra: nu x nv x nw, with every cell beyond the middle of `axis` cut into eight.
@@ -346,13 +385,14 @@ TEST_F(MeshBorders, HangingNodesOnCurvedJoints) {
     const ArrayPiece piece = jointOf(*scene_, {32, 16, 16}, axis);
     size_t inside = 0, cut = 0;
     forEachSplat(piece, folder_.path(),
-                 [&, axis_of_joint = static_cast<int>(axis)](const glm::dvec3& x, uint32_t border_code) {
+                 [&, axis_of_joint = static_cast<int>(axis)](const glm::dvec3& x, const SplatGeometry& of,
+                                                             size_t splat) {
                    const std::optional<glm::dvec3> uvw = scene_->inverse(x);
                    if (!uvw || std::abs((*uvw)[axis_of_joint] - 0.5) > 0.15) return;
                    for (int n = 0; n < 3; ++n)
                      if (n != axis_of_joint && std::abs((*uvw)[n] - 0.5) > 0.35) return;
                    ++inside;
-                   cut += border_code != kNoBorder;
+                   cut += of.border_code[splat] != kNoBorder;
                  });
     EXPECT_GT(inside, 500u) << what;
     EXPECT_EQ(cut, 0u) << "of " << inside << " points at a joint across " << what;
