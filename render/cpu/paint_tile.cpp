@@ -183,13 +183,14 @@ class Listed {
   /// first of them is blended: what was written as many narrow vectors is not ready at once to be read as a wide one.
   HWY_INLINE bool paint(const OrderList& list, int block) {
     bool found[kAtOnce];
+    lookAhead(list, 0);
     for (size_t begin = 0; begin < list.size(); begin += kAtOnce) {
+      lookAhead(list, begin + kAtOnce);
       const OrderList some = list.subspan(begin, std::min(kAtOnce, list.size() - begin));
       for (size_t n = 0; n < some.size(); ++n) {
         const uint32_t number = numberOf(some[n]);
         if (places_[number].way == kUnknown) prepare(number / kLanes);
         const auto [way, at] = places_[number];
-        if (n + 1 < some.size()) prefetch(places_[numberOf(some[n + 1])]);
         if (way == kPixels)
           found[n] = lookUpBlock(pixelwise_[at].e, pixelwise_[at].scalar, {work_->table, footprint_},
                                  cornerOf(block), looked_up_[n]);
@@ -245,10 +246,19 @@ class Listed {
     for (size_t line = 0; line < sizeof(Prepared); line += 64) hwy::Prefetch(at + line);
   }
   HWY_INLINE void prefetch(Place place) const {
-    if (place.way == kPixels)
+    if (place.way == kPlain)
+      prefetchAll(plains_[place.at]);
+    else if (place.way == kPixels)
       prefetchAll(pixelwise_[place.at]);
     else if (place.way == kCutPixels || place.way == kCut)
       prefetchAll(cuts_[place.at]);
+  }
+  /// Fetches what is prepared of the next splats from `begin` on, and the places of those behind them. Blocks
+  /// need splats in orders of their own, from more memory than a core's nearest cache holds.
+  HWY_INLINE void lookAhead(const OrderList& list, size_t begin) const {
+    const size_t end = std::min(begin + kAtOnce, list.size()), last = std::min(end + kAtOnce, list.size());
+    for (size_t n = begin; n < end; ++n) prefetch(places_[numberOf(list[n])]);
+    for (size_t n = end; n < last; ++n) hwy::Prefetch(&places_[numberOf(list[n])]);
   }
   HWY_INLINE float* placeOf(int block) const { return work_->tile + block * kBlockFloats; }
 
@@ -289,10 +299,7 @@ class Listed {
     Place next = places_[numberOf(list[n])];
     do {
       const Plain& plain = plains_[next.at];
-      if (++n < list.size()) {
-        next = places_[numberOf(list[n])];
-        if (next.way == kPlain) hwy::Prefetch(&plains_[next.at]);
-      }
+      if (++n < list.size()) next = places_[numberOf(list[n])];
       V most = hn::Zero(d);
       for (size_t v = 0; v < kVectors; ++v) {
         blendPlain(plain, footprint_, corner, v * hn::Lanes(d), colour[v], through[v]);
