@@ -166,11 +166,11 @@ void GridNodes::read(const CacheReader& cache, size_t variable, const Stop& thro
   const Manifest& manifest = cache.manifest();
   slopes_.resize(value_.size());
   readLeaves(cache, variable, throw_if_stopped);
-  if (!complete_ || !join(manifest)) return;
+  if (!complete_ || !join(manifest, throw_if_stopped)) return;
   if (manifest.blanked_nodes > 0 && !hasBlanks()) {
     markBlanks();
     readLeaves(cache, variable, throw_if_stopped);
-    if (!complete_ || !join(manifest)) return;
+    if (!complete_ || !join(manifest, throw_if_stopped)) return;
   }
   const VariableInfo& info = manifest.variables[variable];
   const auto least = static_cast<float>(info.min), most = static_cast<float>(info.max);
@@ -202,14 +202,15 @@ void GridNodes::readLeaves(const CacheReader& cache, size_t variable, const Stop
 }
 
 /// Gives nodes that share a splat its place, value and slope. Returns false if they are not found.
-bool GridNodes::join(const Manifest& manifest) {
+bool GridNodes::join(const Manifest& manifest, const Stop& throw_if_stopped) {
   if (joined_.empty()) {
     std::vector<uint8_t> is_there(value_.size());
     for (size_t node = 0; node < value_.size(); ++node) is_there[node] = !std::isnan(value_[node]);
     complete_ = static_cast<uint64_t>(std::count(is_there.begin(), is_there.end(), 1)) == manifest.splats;
     if (!complete_) return false;
-    auto joined = findJoinedNodes(blocks_, is_there, joinedNodes(manifest),
-                                  [&](size_t node) { return glm::dvec3(position(node)); });
+    auto joined = findJoinedNodes(
+        blocks_, is_there, joinedNodes(manifest), [&](size_t node) { return glm::dvec3(position(node)); },
+        throw_if_stopped);
     complete_ = joined.has_value();
     if (joined) joined_ = *std::move(joined);
   }

@@ -46,8 +46,9 @@ class GridNodes {
   };
   static Bytes bytes(const Manifest& manifest, bool two_scalars);
 
-  /// Reads all leaves. `other`: a second variable, or none. `throw_if_stopped` is called between leaves. Throws as
-  /// CacheReader::readGeometry() does, and DamagedBrick if leaves have nodes outside of the grid; with `keep_going` damaged() has them.
+  /// Reads all leaves. `other`: a second variable, or none. `throw_if_stopped` is called between leaves and faces
+  /// of blocks. Throws as CacheReader::readGeometry() does, and DamagedBrick if leaves have nodes outside of the
+  /// grid; with `keep_going` damaged() has them.
   GridNodes(const CacheReader& cache, size_t variable, std::optional<size_t> other, bool keep_going,
             const std::function<void()>& throw_if_stopped);
 
@@ -91,7 +92,7 @@ class GridNodes {
   void readLeaves(const CacheReader& cache, size_t variable, const Stop& throw_if_stopped);
   void addLeaf(const CacheReader& cache, uint32_t brick, const SplatGeometry& geometry,
                const SplatVariable& values, const std::vector<NodeRun>& runs);
-  bool join(const Manifest& manifest);
+  bool join(const Manifest& manifest, const Stop& throw_if_stopped);
   void copyToJoined();
   void markBlanks();
   using Index = std::array<uint64_t, 3>;

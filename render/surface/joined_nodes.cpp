@@ -71,8 +71,12 @@ struct Missing {
 class Joiner {
  public:
   Joiner(std::span<const NodeLattice3> blocks, std::span<const uint8_t> is_there,
-         const std::function<glm::dvec3(size_t node)>& at)
-      : blocks_(blocks), is_there_(is_there), at_(at), same_(is_there.size(), kNobody) {
+         const std::function<glm::dvec3(size_t node)>& at, const std::function<void()>& throw_if_stopped)
+      : blocks_(blocks),
+        is_there_(is_there),
+        at_(at),
+        throw_if_stopped_(throw_if_stopped),
+        same_(is_there.size(), kNobody) {
     for (size_t block = 0; block < blocks.size(); ++block)
       for (size_t axis = 0; axis < 3; ++axis)
         for (const bool at_end : {false, true}) faces_.push_back({block, axis, at_end});
@@ -100,7 +104,7 @@ class Joiner {
         }
       if (compared_ > kMaxCompared) break;
     }
-    if (has_blanks && left > 0) left -= static_cast<int64_t>(joinBesideBlanks());
+    if (left > 0) left -= static_cast<int64_t>(has_blanks ? joinBesideBlanks() : joinBesideJoined());
     if (left != 0) return std::nullopt;
     std::vector<JoinedNode> joined;
     for (size_t node = 0; node < same_.size(); ++node)
@@ -168,23 +172,39 @@ class Joiner {
   static double lengthOf(const glm::dvec3& in_cells) {
     return std::max({std::abs(in_cells.x), 2 * std::abs(in_cells.y), 2 * std::abs(in_cells.z)});
   }
-  /// The candidate nearest to there, in cells.
+  /// The same in lengths of the last cell along axes of thinner cells: a collapsed line's splat, which half a disc shares, lies many of
+  /// the cells around the line beside it.
+  static double lengthAcross(const Missing& missing, const glm::dvec3& way) {
+    const glm::dvec3 in_cells = missing.in_cells * way;
+    const glm::dmat3& cell = missing.expected.cell;
+    double length = std::abs(in_cells.x);
+    for (int n = 1; n < 3; ++n)
+      length = std::max(length,
+                        std::abs(in_cells[n]) *
+                            std::min(2.0, kNear / kMaxAside * glm::length(cell[n]) / glm::length(cell[0])));
+    return length;
+  }
+  /// The candidate nearest to there, in cells; else across.
   std::optional<size_t> nearest(const Missing& missing) {
     const Expected& expected = missing.expected;
     const glm::dvec3 reach =
         kNear * (glm::abs(expected.cell[0]) + glm::abs(expected.cell[1]) + glm::abs(expected.cell[2]));
-    std::optional<size_t> best;
-    double least = kNear;
+    std::optional<size_t> best, across;
+    double least = kNear, least_across = kNear;
     compared_ +=
         candidates_.forBox(expected.at - reach, expected.at + reach, [&](const NodeTree::Point& candidate) {
-          const double distance = lengthOf(missing.in_cells * (candidate.at - expected.at));
+          const glm::dvec3 way = candidate.at - expected.at;
+          const double distance = lengthOf(missing.in_cells * way),
+                       distance_across = lengthAcross(missing, way);
           if (distance < least) least = distance, best = candidate.number;
+          if (distance_across < least_across) least_across = distance_across, across = candidate.number;
         });
-    return best;
+    return best ? best : across;
   }
 
   /// Finds nodes of a face by one map; how many.
   size_t joinFace(const BlockFace& face) {
+    throw_if_stopped_();
     std::vector<Missing> missing;
     forFace(face, [&](const Place& place, size_t node) {
       if (isKnown(node)) return;
@@ -198,7 +218,7 @@ class Joiner {
       if (const auto node = nearest(missing[n])) vote(missing[n].place, *node, votes);
     const Taken best = bestOf(face, missing, mapsFor(face, votes));
     for (const auto& [node, same] : best.nodes) same_[node] = static_cast<uint32_t>(same);
-    if (!best.nodes.empty() && collapsed(best.map) == 0) maps_.emplace_back(face, best.map);
+    if (!best.nodes.empty()) maps_.emplace_back(face, best.map);
     return best.nodes.size();
   }
   /// Finds nodes that nothing tells where to expect, since blanked ones lie behind them: by the maps of the others on their faces.
@@ -207,9 +227,37 @@ class Joiner {
     for (const auto& face_and_map : maps_) {
       const BlockFace& face = face_and_map.first;
       const FaceMap& map = face_and_map.second;
+      if (collapsed(map) != 0) continue;
       forFace(face, [&](const Place& place, size_t node) {
         const auto to = nodeAt(map.to, {map.along[0].at(place), map.along[1].at(place)});
         if (isKnown(node) || !to || !is_there_[*to] || expected(face, place)) return;
+        same_[node] = static_cast<uint32_t>(*to);
+        ++found;
+      });
+    }
+    return found;
+  }
+
+  /// Finds nodes that share a splat which lies far from them, as where a collapsed line ends: by the maps of those beside them.
+  size_t joinBesideJoined() {
+    size_t found = 0;
+    for (const auto& face_and_map : maps_) {
+      const BlockFace& face = face_and_map.first;
+      const FaceMap& map = face_and_map.second;
+      const auto mapped = [&](const Place& place) {
+        return nodeAt(map.to, {map.along[0].at(place), map.along[1].at(place)});
+      };
+      const auto is_joined = [&](const Place& place) {
+        const auto node = nodeAt(face, place), to = mapped(place);
+        return node && to && same_[*node] == *to;
+      };
+      forFace(face, [&](const Place& place, size_t node) {
+        const auto [u, v] = place;
+        const auto to = mapped(place);
+        if (isKnown(node) || !to || !is_there_[*to]) return;
+        if (!is_joined({u - 1, v}) && !is_joined({u + 1, v}) && !is_joined({u, v - 1}) &&
+            !is_joined({u, v + 1}))
+          return;
         same_[node] = static_cast<uint32_t>(*to);
         ++found;
       });
@@ -305,12 +353,15 @@ class Joiner {
 
   Taken taken(const BlockFace& face, const std::vector<Missing>& missing, const FaceMap& map) const {
     Taken out;
-    for (const auto& [place, there, in_cells] : missing) {
+    for (const Missing& one : missing) {
+      const auto& [place, there, in_cells] = one;
       const auto to = nodeAt(map.to, {map.along[0].at(place), map.along[1].at(place)});
       if (!to || !is_there_[*to]) continue;
       const glm::dvec3 way = at_(*to) - there.at;
       const double away = lengthOf(in_cells * way);
-      if (!(away <= kNear) && !(glm::length(way) <= kMaxAside * glm::length(there.cell[0]))) continue;
+      if (!(away <= kNear) && !(glm::length(way) <= kMaxAside * glm::length(there.cell[0])) &&
+          !(lengthAcross(one, way) <= kNear))
+        continue;
       out.nodes.push_back({*nodeAt(face, place), *to});
       out.farthest = std::max(out.farthest, away);
     }
@@ -320,10 +371,11 @@ class Joiner {
   const std::span<const NodeLattice3> blocks_;
   const std::span<const uint8_t> is_there_;
   const std::function<glm::dvec3(size_t node)>& at_;
+  const std::function<void()>& throw_if_stopped_;
   std::vector<BlockFace> faces_;
   NodeTree candidates_;         // nodes of faces that have splats
   std::vector<uint32_t> same_;  // [node]: whose splat it has; kNobody: its own, or not known
-  std::vector<std::pair<BlockFace, FaceMap>> maps_;  // that have found nodes, but for collapsed ones
+  std::vector<std::pair<BlockFace, FaceMap>> maps_;  // that have found nodes
   uint64_t compared_ = 0;
 };
 
@@ -341,9 +393,10 @@ uint64_t joinBytes(const NodeLattice3& block) {
 
 std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,
                                                        std::span<const uint8_t> is_there, uint64_t count,
-                                                       const std::function<glm::dvec3(size_t node)>& at) {
+                                                       const std::function<glm::dvec3(size_t node)>& at,
+                                                       const std::function<void()>& throw_if_stopped) {
   if (count == 0) return std::vector<JoinedNode>();
-  return Joiner(blocks, is_there, at).find(count);
+  return Joiner(blocks, is_there, at, throw_if_stopped).find(count);
 }
 
 }  // namespace curvisplat

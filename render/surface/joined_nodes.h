@@ -38,9 +38,10 @@ uint64_t joinBytes(const NodeLattice3& block);
 
 /// The partners of nodes for which is_there[node] is 0, in the order of the nodes: of `count` of them, the others are blanked. None if it
 /// cannot be told which these are. `at`: where a node is.
-/// Takes as long as some 10⁸ comparisons at most. Pure.
+/// Takes as long as some 10⁸ comparisons at most. `throw_if_stopped` is called for each face. Pure.
 std::optional<std::vector<JoinedNode>> findJoinedNodes(std::span<const NodeLattice3> blocks,
                                                        std::span<const uint8_t> is_there, uint64_t count,
-                                                       const std::function<glm::dvec3(size_t node)>& at);
+                                                       const std::function<glm::dvec3(size_t node)>& at,
+                                                       const std::function<void()>& throw_if_stopped);
 
 }  // namespace curvisplat

@@ -14,6 +14,7 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -351,6 +352,53 @@ TEST_F(IsoMeshesTest, ManySmallBlocksAreJoined) {
   EXPECT_EQ(openEdges(*mesh), 0u);
   EXPECT_EQ(doubledVertices(*mesh), 0u);
   EXPECT_NEAR(areaOf(*mesh), 4 * std::numbers::pi * 1.5 * 1.5, 0.1);
+}
+
+/// Half a wing: before its tip the lines at k = 0 are one point each, behind it they are the two sides of a plate that is wider for larger
+/// i. Cells are thin around it, and long along i.
+glm::dvec3 wingPlace(const GridNode& n) {
+  const double angle = std::numbers::pi * double(n.j) / 40;
+  const double radius = 1e-4 * std::expm1(0.3 * double(n.k)) / 0.3,
+               half_span = 0.05 * std::max(0.0, double(n.i) - 8);
+  return {0.15 * (double(n.i) - 8) + 0.005 * double(n.i * n.i), (half_span + radius) * std::sin(angle),
+          radius * std::cos(angle)};
+}
+
+TEST_F(IsoMeshesTest, NodesOfAHalfDiscsAxisAreFoundAgain) {
+  const auto field = [](const glm::dvec3& at) { return at.x + 2 * at.y + at.z; };
+  const CacheReader cache = converted(
+      [&](const GridNode& n) {
+        // Both sides of the plate have the same places.
+        const glm::dvec3 at = wingPlace({0, n.i, n.k == 0 ? std::min(n.j, 40 - n.j) : n.j, n.k});
+        return NodeValues{at, {static_cast<float>(field(at))}};
+      },
+      {21, 41, 31});
+  // There is one splat on each of nine points at k = 0, and one for two nodes of the plate.
+  ASSERT_EQ(cache.manifest().nodes - cache.manifest().splats, 9u * 40 + 12 * 20);
+  const GridNodes nodes(cache, 0, std::nullopt, false, kNeverStopped);
+  ASSERT_TRUE(nodes.areComplete());
+  for (size_t node = 0; node < size_t{21} * 41 * 31; ++node) {
+    const GridNode n{0, node % 21, node / 21 % 41, node / 21 / 41};
+    const glm::dvec3 at = nodes.origin() + glm::dvec3(nodes.position(node));
+    // The tip has a splat with half a cell of the plate; the farther cells are as long as they are far.
+    const double near = n.i == 8 && n.k == 0 ? 0.15 : n.k < 20 ? 0.05 : 0.15;
+    EXPECT_NEAR(glm::length(at - wingPlace(n)), 0, near) << n.i << ' ' << n.j << ' ' << n.k;
+    EXPECT_NEAR(nodes.value(node), field(wingPlace(n)), 2 * near) << n.i << ' ' << n.j << ' ' << n.k;
+  }
+}
+
+TEST_F(IsoMeshesTest, TheSearchForJoinedNodesCanBeStopped) {
+  const CacheReader cache =
+      converted(FunctionGridSource(std::vector<GridBlock>(2, gridBlock(6, 6, 6)), 1, [](const GridNode& n) {
+        return NodeValues{{5.0 * n.block + double(n.i), n.j, n.k}, {float(n.i)}};
+      }));
+  const auto leaves = std::count_if(cache.bricks().begin(), cache.bricks().end(),
+                                    [](const auto& brick) { return brick.isLeaf(); });
+  int calls = 0;
+  const auto stop_after_leaves = [&] {
+    if (++calls > leaves) throw std::runtime_error("stopped");
+  };
+  EXPECT_THROW(GridNodes(cache, 0, std::nullopt, false, stop_after_leaves), std::runtime_error);
 }
 
 TEST_F(IsoMeshesTest, DamagedLeavesAreNamed) {
