@@ -44,6 +44,32 @@ class WindowPictures : public WindowTest {
   }
 };
 
+/// `view` takes the options of cameras that `render` takes, in place of the view that was left last time: both draw the same
+/// picture, and so does the command that is copied.
+TEST_F(WindowPictures, OpensOnTheViewOfCameraOptions) {
+  for (const Words& camera : {Words{"--view", "-y", "--elevation", "20", "--roll", "10"},
+                              {"--position=9,3,4", "--view-angle", "25"},
+                              {"--azimuth", "40", "--zoom", "1.5"}}) {
+    open(camera);
+    const Image drawn = saveAndCopy();
+    const auto commands = close();
+    ASSERT_EQ(commands.size(), 1u);
+    expectDraws(commands[0], drawn);
+    const Words words{"render",       "a.splats", "-o",     "picture.png",
+                      "--scalar-bar", "--axes",   "--size", valueOf(commands[0], "--size")};
+    expectDraws(words + camera, drawn);
+    EXPECT_LT(difference(readImage("picture.png"),
+                         [&] {
+                           run(words);
+                           return readImage("picture.png");
+                         }()),
+              40);
+  }
+  expectRefused({"view", "a.splats", "--view", "+x", "--position", "1,2,3"}, 2,
+                {"--view cannot be combined with --position"});
+  expectRefused({"view", "a.splats", "--look-at", "3,4", "--from-height", "9"}, 1, {"--globe"});
+}
+
 /// A large window's isosurface takes more than the usual memory, which it gets; a limit that was given stays.
 TEST_F(WindowPictures, GetTheMemoryThatTheyNeed) {
   constexpr ImageSize kLarge{3200, 1800};
