@@ -256,7 +256,7 @@ void render(const RenderArguments& given) {
   const auto noteBackend = [&] {
     if (player.renderer().backendName() == report.backend) return;
     report.backend = player.renderer().backendName();
-    printMessage("warning: OpenGL could not go on; drawn by {}", report.backend);
+    printMessageOfRank(fmt::format("warning: OpenGL could not go on; drawn by {}", report.backend));
   };
   const auto writeReport = [&] {
     if (!arguments.statistics.empty() && ranks.isFirst())
