@@ -474,6 +474,31 @@ TEST(GlTilePainter, HasTheSameBitsInAnyBatchesAndBoxes) {
   });
 }
 
+/// An opaque layer behind all: four depths a pixel, and the bounds of cells of 8, 16, 32, 64 and 128 pixels.
+TEST(GlTilePainter, CountsTheLayersAsMemoryOfTheCard) {
+  const ImageSize size{70, 50};
+  const auto table = lively();
+  std::vector<PixelLayers::Row> rows(static_cast<size_t>(size.height));
+  for (PixelLayers::Row& row : rows)
+    for (int x = 0; x < size.width; ++x) {
+      row.layers.push_back({1e6f, glm::vec4(1)});
+      row.endPixel(row.layers.size() - 1);
+    }
+  const PixelLayers layers(size, std::move(rows), 0);
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    const auto bytesWith = [&](const PixelLayers* of_pixels) {
+      GlTilePainter painter(context);
+      painter.begin(size, kWhite, table, {.layers = of_pixels});
+      painter.draw(leaning(250, size));
+      painter.end();
+      return painter.cardWork().bytes;
+    };
+    constexpr uint64_t kCells = 9 * 7 + 5 * 4 + 3 * 2 + 2 * 1 + 1;
+    EXPECT_EQ(bytesWith(&layers) - bytesWith(nullptr), 16 * size.pixels() + 8 * kCells);
+  });
+}
+
 TEST(GlTilePainter, DrawsRegionsAsTheWhole) {
   const ImageSize size{70, 50};
   const auto table = lively();
