@@ -279,6 +279,8 @@ void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box
   lists.bind();
   picture.bind(painting);
   pixel_counts.bind();
+  if (pixel_counts.areWanted())
+    gl.Uniform1i(painting.uniform("counts_alone"), pixel_counts.areAlone() ? 1 : 0);
   const auto groups = [&](int count) {
     return static_cast<GLuint>((count * tiles.side + kGroupSide - 1) / kGroupSide);
   };

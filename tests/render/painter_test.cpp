@@ -559,14 +559,15 @@ TEST(GlTilePainter, CountsWhatPixelsDo) {
     }
   GlThread gl(GlLibrary::kEgl);
   gl.run([&](const GlContext& context) {
-    for (const bool counts : {false, true}) {
-      if (counts) setenv("CURVISPLAT_COUNT_PIXELS", "1", 1);
+    for (const std::string asked : {"", "1", "alone"}) {
+      setenv("CURVISPLAT_COUNT_PIXELS", asked.c_str(), 1);
       GlTilePainter painter(context);
       unsetenv("CURVISPLAT_COUNT_PIXELS");
       for (const uint64_t copies : {3, 1}) {
-        drawn(painter, std::vector<ScreenSplat>(copies, splat), lively(), size);
+        const Image image = drawn(painter, std::vector<ScreenSplat>(copies, splat), lively(), size);
+        EXPECT_EQ(image.pixel(21, 17)[2] == 1.0f, asked == "alone");  // white, where nothing is blended
         const CardWork work = painter.cardWork();
-        EXPECT_EQ(work.pixels_blended, counts ? copies * inside : 0);
+        EXPECT_EQ(work.pixels_blended, asked.empty() ? 0 : copies * inside);
         // Each pixel of a tile of 16 looks at all splats of its list.
         EXPECT_EQ(work.pixels_listed % (16 * 8), 0u);
         EXPECT_LE(work.pixels_listed, 256 * work.entries);
