@@ -4,7 +4,7 @@ the processor's painter with all cores, and the conversions that they need.
 
     bench/card_frames.py FOLDER [--sizes 1M,10M,50M] [--pictures 1920x1080,3840x2160] [--backends egl,egl-quads,cpu]
                          [--software] [--frames 5] [--threads N] [--json OUT.json] [--program BUNDLE/bin/curvisplat]
-    bench/card_frames.py FOLDER --counts [--grid FILE,FILE,...]   # what a card has to do, counted on any OpenGL 4.3
+    bench/card_frames.py FOLDER --counts [--sizes 1M] [--grid FILE,FILE,...]   # what a card has to do, counted on any OpenGL 4.3
     bench/card_frames.py FOLDER --quick     # tiny sizes, OpenGL in software: a minute
 
 It needs Python alone and the program, which tools/packaging/bundle.sh brings with its libraries to a machine that has neither. It
@@ -30,9 +30,10 @@ them, of which medians are printed, from the program's own --stats:
 and below a row in compute shaders, of one frame: the parts of OpenGL's time; splats of bricks that stay on the card; splats in tiles (entries), and the bytes of memory that
 these take on paper: 32 an entry, which is written, sorted and read; 64 a splat to send it, and twice to read it. Each entry is looked at by the pixels of its tile, 16 where splats lean.
 
-With --counts nothing is timed: a frame of the wake of 1 M nodes and one of the half-annulus of 1 M, all splats drawn, and the default
-picture of the grid, if one is given, are counted at 1920x1080: splats drawn (with the pieces of those at borders), keys sorted (a splat
-in a tile), how often a pixel looks at a splat of its tile's list, and how often it blends one. From these:
+With --counts nothing is timed: a frame of the wake of 1 M nodes and one of the half-annulus for each of --sizes (1M), all splats drawn,
+and the default picture of the grid, if one is given, are counted at 1920x1080: splats drawn (with the pieces of those at borders), keys
+sorted (a splat in a tile), how often a pixel looks at a splat of its tile's list, and how often it blends one. Nothing is blended, which
+in software would take hours: so nothing is opaque either, and what hides is counted in full. From these:
 
     project    GB: reads 68 bytes a stored splat, writes 64 a drawn one
     list       reads those twice, writes 8 bytes a key; sort: reads and writes the keys
@@ -49,6 +50,7 @@ import os
 import pathlib
 import re
 import statistics
+import sys
 import time
 
 import results
@@ -236,7 +238,8 @@ def count(arguments, out):
     plain = ["--lod-pixels", 0, "--classify", "pixel", "--view", "iso", "--tf", "viridis", "--range", "0,1", "--opacity", "0:0.02,1:0.02",
              "--opacity-unit", 0.03]
     edge = "24x16x12" if arguments.quick else "100x100x100"
-    scenes = [("wake", wake_of(arguments, edge), plain), ("half-annulus", cache_of(arguments, 8000 if arguments.quick else 10**6, out), plain)]
+    scenes = [("wake", wake_of(arguments, edge), plain)]
+    scenes += [(f"half-annulus, {size}", cache_of(arguments, count_of(size), out), plain) for size in arguments.sizes.split(",")]
     if arguments.grid:
         scenes.append((pathlib.Path(arguments.grid.split(",")[0]).name, grid_of(arguments), []))
     print(f"| {picture} | splats | keys sorted | pixels look | pixels blend | GB: project, list, sort, paint, picture | least, ms: bytes, arithmetic |\n"
@@ -244,7 +247,7 @@ def count(arguments, out):
     told = arguments.folder / "counts.json"
     for name, cache, options in scenes:
         results.run([arguments.program, "render", cache, "-o", arguments.folder / "counted.pfm", "--stats", told, "--backend", "egl",
-                     "--card-memory", "1G", "--size", picture, "--memory", "2G", *options], env=os.environ | {"CURVISPLAT_COUNT_PIXELS": "1"})
+                     "--card-memory", "4G", "--size", picture, "--memory", "2G", *options], env=os.environ | {"CURVISPLAT_COUNT_PIXELS": "alone"})
         frame = json.loads(told.read_text())["frames"][0]
         if not frame["card_pixels_listed"]:
             sys.exit(f"{name}: no compute shaders drew it; see {arguments.program} info --system")
@@ -277,7 +280,7 @@ def main():
     arguments = parser.parse_args()
     quick = arguments.quick
     arguments.software |= quick
-    arguments.sizes = arguments.sizes or ("8K,60K" if quick else "1M,10M,50M")
+    arguments.sizes = arguments.sizes or ("8K,60K" if quick else "1M" if arguments.counts else "1M,10M,50M")
     arguments.pictures = arguments.pictures or ("320x180" if quick else "1920x1080,3840x2160")
     arguments.frames = arguments.frames or (2 if quick else 5)
     arguments.folder.mkdir(parents=True, exist_ok=True)

@@ -357,7 +357,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
   makePools(options);
   exchange_.reset();
   if (plan.shared) beginExchange(plan, options);
-  fillStore(plan, options, statistics);
+  fillStore(plan, options, on_card != nullptr, statistics);
   const FrameWork work{cache_,  plan.parts, plan.settings,      planner_.table(), plan.keys,
                        hidden_, is_stored_, options.keep_going, exchange_.get()};
   // With keep_going, what replaces a damaged brick may reach into any region.

@@ -172,7 +172,8 @@ class FramePipeline {
                                      std::shared_ptr<CardPicture>* on_card);
   void stopStages();
   FrameBudget budgetOf(const FrameOptions& options) const;
-  void fillStore(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
+  void fillStore(const FramePlan& plan, const FrameOptions& options, bool on_card,
+                 FrameStatistics& statistics);
   void putIntoStore(std::span<const StoredPart> parts, const BorderStyle& borders,
                     const FrameOptions& options, FrameStatistics& statistics);
   BrickPart fetchedPart(const SweptPart& swept) const;

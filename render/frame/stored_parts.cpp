@@ -25,11 +25,20 @@ bool meetsLayers(const Brick& brick, const ProjectionSettings& settings) {
   return farthestDepthOf(brick, settings.view) - layers.depthOrigin() > nearest;
 }
 
+/// The card's memory of the layers of all pixels, which bricks leave free: four depths, and a window's picture has their colours
+/// there too, in as many textures as there are windows of depth, or fewer.
+uint64_t layerBytes(const FramePlan& plan, bool on_card) {
+  const PixelLayers* const layers = plan.settings.layers;
+  if (!layers || layers->empty()) return 0;
+  const auto textures = 1 + (on_card ? static_cast<uint64_t>(layers->windows()) : 0);
+  return textures * 4 * sizeof(float) * layers->size().pixels();
+}
+
 }  // namespace
 
 /// Chooses the parts that are drawn from the painter's store, if it has one, and sends what is missing there. The choice depends
-/// on nothing but the plan and the card's memory, and so do the picture's bits.
-void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options,
+/// on nothing but the plan, the card's memory and whether the picture stays there, and so do the picture's bits.
+void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options, bool on_card,
                               FrameStatistics& statistics) {
   stored_.clear();
   is_stored_.clear();
@@ -54,7 +63,8 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
     std::vector<StoredPart> missing;
     painting_->run([&](Painter& painter) {
       BrickStore* const store = painter.store();
-      const uint64_t bytes = store ? options.card_memory_bytes.value_or(store->defaultBytes()) : 0;
+      uint64_t bytes = store ? options.card_memory_bytes.value_or(store->defaultBytes()) : 0;
+      bytes -= std::min(bytes, layerBytes(plan, on_card));
       is_storing_ = bytes > 0;
       if (store) store->open(content_, cache_.position());
       const size_t fitting = store ? store->makeRoom(stored_, bytes) : 0;

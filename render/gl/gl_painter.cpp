@@ -107,7 +107,6 @@ struct GlPainter::State {
   std::vector<GlObject> colours;  // an attachment for each window of depth
   ImageSize size{0, 0};
   glm::vec4 background{0};
-  unsigned threads = 0;  // PaintResources'
   struct InFlight {
     GlFence fence;
     GlObject timer;  // a query, done when the fence is passed
@@ -197,7 +196,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   const bool same_size = size == state_->size;
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
   state_->read_bytes = 0;
-  state_->tables.load(size, table, shading);
+  state_->tables.load(size, table, shading, resources.threads);
   state_->allocate(size, state_->tables.windows());
   if (!same_size || !state_->bins || resources.waiting_splats != state_->waiting_splats) {
     state_->bins.emplace(size, kBatchSplats, kEntriesASplat * kBatchSplats, 1);
@@ -215,7 +214,6 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   gl.Viewport(0, 0, size.width, size.height);
   gl.Scissor(0, 0, size.width, size.height);
   state_->background = background;
-  state_->threads = resources.threads;
   gl.ClearColor(0, 0, 0, 0);
   gl.Clear(GL_COLOR_BUFFER_BIT);
   gl.check("beginning a frame");
@@ -343,7 +341,7 @@ Image GlPainter::end() {
   }
   gl.check("reading the picture");
   state_->read_bytes = std::span(drawn).size_bytes();
-  return state.tables.composite(drawn, true, state.background, state.threads);
+  return state.tables.composite(drawn, true, state.background);
 }
 
 double GlPainter::uploadSeconds() const {

@@ -76,7 +76,6 @@ struct GlTilePainter::State {
   TilePicture picture;
   CardPictures card_pictures;
   PixelCounts pixel_counts{gl};
-  unsigned threads = 0;
   glm::vec4 background{0};
   std::stop_token stop;
 
@@ -98,6 +97,7 @@ struct GlTilePainter::State {
   void paintBox(const ListedSplats& listed, const CardTiles& tiles, const TileBox& box);
   void paintLists(const CardTiles& tiles, const TileBox& box);
   void keepWaiting(uint32_t front);
+  void countBytes(uint64_t further = 0);
   void finish();
 };
 
@@ -133,13 +133,12 @@ void GlTilePainter::begin(ImageSize size, const glm::vec4& background, const Cla
   state.lists.resetCounts();
   state.upload_s = state.draw_s = 0;
   state.sent_bytes = state.read_bytes = 0;
-  state.tables.load(size, table, shading);
+  state.tables.load(size, table, shading, resources.threads);
   state.picture.begin(size, state.tables.windows());
   state.stored.begin(table);
   state.pixel_counts.begin(size);
   state.background = background;
   state.stop = resources.stop;
-  state.threads = resources.threads;
   state.clip = {0, 0, size.width, size.height};
   state.batch.assign(kMaxRecords, kNoSplat);
   state.painted = false;
@@ -258,7 +257,13 @@ void GlTilePainter::State::paintBox(const ListedSplats& listed, const CardTiles&
   }
   lists.make(listed, tiles, box, entries);
   timers.measure(kPaint, [&] { paintLists(tiles, box); });
-  most_bytes = std::max(most_bytes, picture.cardBytes() + stored.cardBytes() + lists.cardBytes());
+  countBytes();
+}
+
+/// Counts what the card's memory holds now, and `further` bytes that are about to go.
+void GlTilePainter::State::countBytes(uint64_t further) {
+  most_bytes = std::max(most_bytes, picture.cardBytes() + stored.cardBytes() + lists.cardBytes() +
+                                        tables.layerBytes() + further);
 }
 
 void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box) {
@@ -274,6 +279,8 @@ void GlTilePainter::State::paintLists(const CardTiles& tiles, const TileBox& box
   lists.bind();
   picture.bind(painting);
   pixel_counts.bind();
+  if (pixel_counts.areWanted())
+    gl.Uniform1i(painting.uniform("counts_alone"), pixel_counts.areAlone() ? 1 : 0);
   const auto groups = [&](int count) {
     return static_cast<GLuint>((count * tiles.side + kGroupSide - 1) / kGroupSide);
   };
@@ -323,7 +330,7 @@ Image GlTilePainter::end() {
   state.picture.read([&](std::span<const float> drawn) {
     state.finish();
     state.read_bytes = drawn.size_bytes();
-    image = state.tables.composite(drawn, false, state.background, state.threads);
+    image = state.tables.composite(drawn, false, state.background);
   });
   return image;
 }
@@ -334,8 +341,7 @@ std::shared_ptr<CardPicture> GlTilePainter::endOnCard() {
   state.paintBatch(true);
   const StageTimer timer(state.draw_s, "draw (OpenGL)");
   auto made = state.card_pictures.make(state.picture, state.tables, state.background);
-  state.most_bytes = std::max(state.most_bytes, state.picture.cardBytes() + state.stored.cardBytes() +
-                                                    state.lists.cardBytes() + made->bytes());
+  state.countBytes(made->bytes() + state.tables.layerColourBytes());
   state.finish();
   state.gl.checkReset("drawing");
   return made;

@@ -2,15 +2,24 @@
 
 #include <cstdlib>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "render/gl/splat_shader.h"
 #include "render/project/tile_set.h"
 
 namespace curvisplat {
+namespace {
+
+std::string_view asked() {
+  const char* const value = std::getenv("CURVISPLAT_COUNT_PIXELS");
+  return value ? value : "";
+}
+
+}  // namespace
 
 PixelCounts::PixelCounts(const GlFunctions& gl)
-    : gl_(gl), are_wanted_(std::getenv("CURVISPLAT_COUNT_PIXELS") != nullptr), counters_(gl) {}
+    : gl_(gl), are_wanted_(!asked().empty()), are_alone_(asked() == "alone"), counters_(gl) {}
 
 void PixelCounts::begin(ImageSize size) {
   if (!are_wanted_) return;

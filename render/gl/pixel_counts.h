@@ -1,5 +1,6 @@
 // Counts what the pixels of a picture do in compute shaders, for bench/card_frames.py, which sets the environment variable
-// CURVISPLAT_COUNT_PIXELS. Without it, splatTileShader() has no counters, and nothing is allocated.
+// CURVISPLAT_COUNT_PIXELS. Without it, splatTileShader() has no counters, and nothing is allocated. As "alone", pixels
+// count what they would blend and blend nothing, which is less work in software: as if nothing were opaque.
 //
 // All calls are on the context's thread.
 #pragma once
@@ -17,6 +18,7 @@ class PixelCounts {
   explicit PixelCounts(const GlFunctions& gl);
 
   bool areWanted() const { return are_wanted_; }
+  bool areAlone() const { return are_alone_; }
   /// Begins a picture, of which nothing is counted yet.
   void begin(ImageSize size);
   /// Binds the counters: two for each large tile, since the sum of a picture may exceed 32 bits.
@@ -30,7 +32,7 @@ class PixelCounts {
 
  private:
   const GlFunctions& gl_;
-  const bool are_wanted_;
+  const bool are_wanted_, are_alone_;
   CardBuffer counters_;
   uint64_t listed_ = 0, blended_ = 0;
 };

@@ -339,6 +339,7 @@ uniform ivec3 closed_places;  // columns of the picture's small tiles, and of it
 const float kSaturated = 1.0 / 4096.0;
 #if COUNTS
 layout(std430, binding = COUNTS_BINDING) buffer Counts { uvec2 counts[]; };  // [large tile]: splats looked at, splats blended
+uniform bool counts_alone;
 uvec2 counted = uvec2(0);
 #endif
 
@@ -369,6 +370,7 @@ void main() {
     if (rho2 >= support * support) continue;
 #if COUNTS
     ++counted.y;
+    if (counts_alone) continue;
 #endif
     uvec2 tail = splats[4 * n + 2].zw;  // skew, along
     // Zeros where it has none: what the driver leaves in them is computed with, if only times 0.

@@ -60,8 +60,10 @@ SplatTables::SplatTables(const GlFunctions& gl)
   footprint_.fill(gl, kFootprintUnit, GL_RG32F, footprintTexels());
 }
 
-void SplatTables::load(ImageSize size, const ClassificationTable& table, const PixelShading& shading) {
+void SplatTables::load(ImageSize size, const ClassificationTable& table, const PixelShading& shading,
+                       unsigned threads) {
   size_ = size;
+  threads_ = threads;
   table_ = &table;
   shading_ = shading;
   layers_ = shading.layers && !shading.layers->empty() ? shading.layers : nullptr;
@@ -70,16 +72,35 @@ void SplatTables::load(ImageSize size, const ClassificationTable& table, const P
   if (shading.colours) colours_.fill(gl_, kColoursUnit, GL_RGBA32F, floatsOf(shading.colours->cumulative()));
 }
 
+/// Calls work(y) for the picture's rows, on several threads.
+template <typename Work>
+void SplatTables::forRows(const Work& work) const {
+  constexpr int kSome = 16;  // rows
+  tbb::task_arena arena(
+      std::min(static_cast<int>(threadsOrCores(threads_)), tbb::info::default_concurrency()));
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<int>(0, size_.height, kSome), [&](const auto& rows) {
+      for (int y = rows.begin(); y < rows.end(); ++y) work(y);
+    });
+  });
+}
+
 /// The depths of the pixels' layers, as the shader reads them.
 void SplatTables::loadLayers() {
   static_assert(PixelLayers::kMaxLayers == 4);
-  std::vector<float> depths(4 * size_.pixels(), PixelLayers::kNowhere);
-  for (int y = 0; y < size_.height; ++y)
-    for (int x = 0; x < size_.width; ++x) {
-      float* at =
-          &depths[4 * (static_cast<size_t>(y) * static_cast<size_t>(size_.width) + static_cast<size_t>(x))];
-      for (const PixelLayer& layer : layers_->at(x, y)) *at++ = layer.depth;
+  const auto width = static_cast<size_t>(size_.width);
+  std::vector<glm::vec4> depths(size_.pixels(), glm::vec4(PixelLayers::kNowhere));
+  std::vector<size_t> most(static_cast<size_t>(size_.height));
+  forRows([&](int y) {
+    glm::vec4* to = &depths[static_cast<size_t>(y) * width];
+    size_t& most_of_row = most[static_cast<size_t>(y)];
+    for (int x = 0; x < size_.width; ++x, ++to) {
+      const std::span<const PixelLayer> layers = layers_->at(x, y);
+      for (size_t n = 0; n < layers.size(); ++n) (*to)[static_cast<int>(n)] = layers[n].depth;
+      most_of_row = std::max(most_of_row, layers.size());
     }
+  });
+  most_layers_ = *std::max_element(most.begin(), most.end());
   gl_.ActiveTexture(GL_TEXTURE0 + kLayersUnit);
   gl_.BindTexture(GL_TEXTURE_2D, layers_texture_.name());
   gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -89,30 +110,29 @@ void SplatTables::loadLayers() {
   const std::vector<PixelLayers::Bounds> bounds = layers_->allBounds();
   static_assert(sizeof(PixelLayers::Bounds) == 2 * sizeof(float));
   layer_bounds_.fill(gl_, kLayerBoundsUnit, GL_RG32F, {&bounds.data()->nearest, 2 * bounds.size()});
+  depth_bytes_ = depths.size() * sizeof(glm::vec4) + bounds.size() * sizeof(PixelLayers::Bounds);
   gl_.check("loading the depths of surfaces");
 }
 
 int SplatTables::loadLayerColours(const GlObject& texture, GLint unit) const {
   if (!layers_) return 0;
-  size_t count = 0;
-  for (int y = 0; y < size_.height; ++y)
-    for (int x = 0; x < size_.width; ++x) count = std::max(count, layers_->at(x, y).size());
   gl_.ActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
   gl_.BindTexture(GL_TEXTURE_2D_ARRAY, texture.name());
   gl_.TexStorage3D(GL_TEXTURE_2D_ARRAY, 1, GL_RGBA32F, size_.width, size_.height,
-                   static_cast<GLsizei>(count));
+                   static_cast<GLsizei>(most_layers_));
   std::vector<glm::vec4> colours(size_.pixels());
-  for (size_t n = 0; n < count; ++n) {
-    auto colour = colours.begin();
-    for (int y = 0; y < size_.height; ++y)
+  for (size_t n = 0; n < most_layers_; ++n) {
+    forRows([&](int y) {
+      glm::vec4* to = &colours[static_cast<size_t>(y) * static_cast<size_t>(size_.width)];
       for (int x = 0; x < size_.width; ++x) {
         const std::span<const PixelLayer> layers = layers_->at(x, y);
-        *colour++ = n < layers.size() ? layers[n].colour : glm::vec4(0.0f);
+        *to++ = n < layers.size() ? layers[n].colour : glm::vec4(0.0f);
       }
+    });
     gl_.TexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, static_cast<GLint>(n), size_.width, size_.height, 1,
                       GL_RGBA, GL_FLOAT, colours.data());
   }
-  return static_cast<int>(count);
+  return static_cast<int>(most_layers_);
 }
 
 SplatShaderKind SplatTables::kind() const {
@@ -154,20 +174,19 @@ void SplatTables::use(const GlProgram& program) const {
   set("cells_from_colour", "colours_below", "colours_above", *shading_.colours);
 }
 
-Image SplatTables::composite(std::span<const float> drawn, bool opacities, const glm::vec4& background,
-                             unsigned threads) const {
+Image SplatTables::composite(std::span<const float> drawn, bool opacities,
+                             const glm::vec4& background) const {
   Image image(size_);
   const auto add = [&](PixelResult& result, const float* c) {
     result.add({c[0], c[1], c[2]}, opacities ? 1 - c[3] : c[3]);
   };
-  const auto finish = [&](size_t pixel) {
-    const auto width = static_cast<size_t>(size_.width);
+  const auto finish = [&](int x, int y) {
+    const size_t pixel = static_cast<size_t>(y) * static_cast<size_t>(size_.width) + static_cast<size_t>(x);
     const float* from = &drawn[4 * pixel];
     PixelResult result;
     add(result, from);
     if (layers_)
-      for (const PixelLayer& layer :
-           layers_->at(static_cast<int>(pixel % width), static_cast<int>(pixel / width))) {
+      for (const PixelLayer& layer : layers_->at(x, y)) {
         result.add(glm::vec3(layer.colour), 1 - layer.colour.w);
         if (layer.colour.w >= 1) break;
         from += 4 * size_.pixels();
@@ -177,12 +196,8 @@ Image SplatTables::composite(std::span<const float> drawn, bool opacities, const
     for (int c = 0; c < 3; ++c) to[c] = result.colour[c] + result.through * background[c];
     to[3] = 1 - result.through * (1 - background[3]);
   };
-  tbb::task_arena arena(
-      std::min(static_cast<int>(threadsOrCores(threads)), tbb::info::default_concurrency()));
-  arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, size_.pixels(), 1 << 16), [&](const auto& some) {
-      for (size_t pixel = some.begin(); pixel < some.end(); ++pixel) finish(pixel);
-    });
+  forRows([&](int y) {
+    for (int x = 0; x < size_.width; ++x) finish(x, y);
   });
   return image;
 }

@@ -29,10 +29,16 @@ class SplatTables {
  public:
   explicit SplatTables(const GlFunctions& gl);
 
-  /// Loads the tables of a frame. `table` and what `shading` borrows are borrowed until the frame ends.
-  void load(ImageSize size, const ClassificationTable& table, const PixelShading& shading);
+  /// Loads the tables of a frame. `table` and what `shading` borrows are borrowed until the frame ends. `threads`: that share
+  /// the work of this frame; 0: one per core.
+  void load(ImageSize size, const ClassificationTable& table, const PixelShading& shading, unsigned threads);
   /// The kind of program that draws the frame's splats.
   SplatShaderKind kind() const;
+  /// The card's memory of the layers' depths and their bounds, and that of loadLayerColours().
+  uint64_t layerBytes() const { return layers_ ? depth_bytes_ : 0; }
+  uint64_t layerColourBytes() const {
+    return layers_ ? sizeof(glm::vec4) * size_.pixels() * most_layers_ : 0;
+  }
   int windows() const { return layers_ ? layers_->windows() : 1; }
   /// Sets the frame's uniforms of a program of that kind, which is then in use.
   void use(const GlProgram& program) const;
@@ -41,12 +47,13 @@ class SplatTables {
   /// to the unit. Returns how many.
   int loadLayerColours(const GlObject& texture, GLint unit) const;
   /// The frame's picture. `drawn` [windows() pictures, one after the other]: colours, and transmittances or, by
-  /// `opacities`, one minus those. `threads`: that share the work; 0: one per core.
-  Image composite(std::span<const float> drawn, bool opacities, const glm::vec4& background,
-                  unsigned threads) const;
+  /// `opacities`, one minus those.
+  Image composite(std::span<const float> drawn, bool opacities, const glm::vec4& background) const;
 
  private:
   void loadLayers();
+  template <typename Work>
+  void forRows(const Work& work) const;
 
   const GlFunctions& gl_;
   TableTexture footprint_, classes_, colours_, layer_bounds_;
@@ -55,6 +62,9 @@ class SplatTables {
   const ClassificationTable* table_ = nullptr;
   const PixelLayers* layers_ = nullptr;  // null: none
   PixelShading shading_;
+  unsigned threads_ = 0;
+  size_t most_layers_ = 0;  // of a pixel
+  uint64_t depth_bytes_ = 0;
 };
 
 }  // namespace curvisplat

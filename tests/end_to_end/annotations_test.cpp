@@ -221,6 +221,11 @@ TEST_F(Annotations, TextsSayWhatIsShown) {
   // Fields are those of the picture: the same pixels as text that says so.
   EXPECT_EQ(render({"--label", "{scalar}|{units}|{time}|{step}|{frame:03d}"}).rgba,
             render({"--label", "f||0|0|000"}).rgba);
+  // Without a unit nothing is left of what stands around it.
+  for (const char* text :
+       {"{scalar} in {units}, t", "{scalar} [{units}], t", "{scalar} ({units}), t", "{scalar} {units}, t"})
+    EXPECT_EQ(render({"--label", text}).rgba, render({"--label", "f, t"}).rgba) << text;
+  EXPECT_EQ(render({"--label", "in {units}bin {units}(a"}).rgba, render({"--label", "bin(a"}).rgba);
   // Too long a title is made smaller, and keeps both ends.
   const Image longest = onWhite({"--title", "|" + std::string(40, 'm') + "|"});
   EXPECT_EQ(changed(plain, longest, 0, 200, 24, 160), 0);

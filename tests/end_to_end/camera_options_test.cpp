@@ -1,4 +1,5 @@
 // Options of the camera: turned on top of where it is, and fitted to what a clip box leaves.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -59,6 +60,25 @@ TEST_F(CameraOptions, ACameraIsTurnedOnTopOfWhereItIs) {
   for (std::string word; chosen >> word;) again.push_back(word);
   expectSays(out, "--position");
   EXPECT_EQ(compareImages(readImage(file("a.exr")), render(again, "b.exr")).largest, 0) << out;
+}
+
+/// The printed choice has the scale, so that it draws the same picture when the data or the box are others.
+TEST_F(CameraOptions, TheScaleThatFitsIsPrinted) {
+  for (const Words& view : {Words{"--view", "+x"},
+                            {"--position", "1,7,3"},
+                            {"--view", "iso", "--azimuth", "20", "--roll", "30", "--zoom", "1.5"},
+                            {"--view", "-y", "--orbit", "90", "--frames", "1"}}) {
+    const nlohmann::json camera = cameraOf(view);
+    const std::string words = "--parallel-scale ", out = last_.out;
+    ASSERT_NE(out.find(words), std::string::npos) << testing::PrintToString(view) << out;
+    const double zoom = view.back() == "1.5" ? 1.5 : 1,
+                 printed = std::stod(out.substr(out.find(words) + words.size()));
+    EXPECT_NEAR(printed / zoom, camera["parallel_scale"], 1e-12) << testing::PrintToString(view);
+    EXPECT_EQ(cameraOf(view + Words{"--parallel-scale", fmt::format("{}", printed)}), camera);
+    EXPECT_EQ(last_.out.find(words), std::string::npos) << last_.out;
+  }
+  cameraOf({"--view", "+x", "--view-angle", "30"});
+  EXPECT_EQ(last_.out.find("--parallel-scale"), std::string::npos) << last_.out;
 }
 
 TEST_F(CameraOptions, AViewFitsWhatAClipBoxLeaves) {

@@ -349,6 +349,26 @@ TEST_F(RanksCommand, NameTheRankWhoseDiskIsFull) {
     EXPECT_EQ(entry.path().filename().string().find("never.splats"), std::string::npos) << entry.path();
 }
 
+TEST_F(RanksCommand, NameTheRankWhoseCardFails) {
+  const std::string card =
+      (fs::path(CURVISPLAT_PROGRAM).parent_path().parent_path() / "tests/liblost_card.so").string();
+  if (!fs::exists(card)) GTEST_SKIP() << "sanitizers have their own preloaded library";
+  const Words words = renderTo("egl.exr", {"--backend", "egl"});
+  if (const ProgramResult drawn = runProgram(words); drawn.status != 0) GTEST_SKIP() << drawn.err;
+  const std::string script = file("one_lost.sh");
+  writeFileAtomically(script, fmt::format("#!/bin/sh\n"
+                                          "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && export LD_PRELOAD=\"{}\"\n"
+                                          "exec \"{}\" \"$@\"\n",
+                                          card, CURVISPLAT_PROGRAM));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(3, words, script);
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  expectSays(result.err, "rank 1 of 3");
+  expectSays(result.err, "warning: OpenGL could not go on; drawn by");
+  expectSays(result.err, "the graphics card was reset");
+}
+
 TEST_F(RanksCommand, AreSimulatedFromTheIndex) {
   run({"bench", file("g.splats"), "--ranks", "1,2,16,1024", "--size", "640x480", "--json", file("b.json"),
        "--plot", file("plots")});

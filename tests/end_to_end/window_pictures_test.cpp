@@ -1,6 +1,11 @@
 // Pictures that the window saves in another size than it shows; movies that it saves, which are the pictures
 // that `render` draws; and a session from the beginning to the end, with a screenshot after every step: for
 // people to look at, too.
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <glm/vec3.hpp>
+#include <nlohmann/json.hpp>
+
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
@@ -43,6 +48,46 @@ class WindowPictures : public WindowTest {
     return readImage(name);
   }
 };
+
+/// `view` takes the options of cameras that `render` takes, in place of the view that was left last time. The copied command
+/// draws the same picture; `render` fits the data into a picture whose scalar bar may be a little wider.
+TEST_F(WindowPictures, OpensOnTheViewOfCameraOptions) {
+  struct Seen {
+    glm::dvec3 towards, up;
+    double half_height;
+  };
+  const auto seenBy = [](const Words& command) {
+    run(command + Words{"--stats", "camera.json"});
+    const nlohmann::json camera = jsonOf("camera.json")["frames"][0]["camera"];
+    const auto point = [&](const char* name) {
+      return glm::dvec3(camera[name][0], camera[name][1], camera[name][2]);
+    };
+    const glm::dvec3 way = point("position") - point("focal_point");
+    const bool perspective = camera["projection"] == "perspective";
+    const double degrees = perspective ? camera["view_angle_deg"].get<double>() : 0;
+    return Seen{glm::normalize(way), glm::normalize(point("view_up")),
+                perspective ? glm::length(way) * std::tan(glm::radians(degrees / 2))
+                            : camera["parallel_scale"].get<double>()};
+  };
+  for (const Words& camera : {Words{"--view", "-y", "--elevation", "20", "--roll", "10"},
+                              {"--position=9,3,4", "--view-angle", "25"},
+                              {"--azimuth", "40", "--zoom", "1.5"}}) {
+    open(camera);
+    const Image drawn = saveAndCopy();
+    const auto commands = close();
+    ASSERT_EQ(commands.size(), 1u);
+    expectDraws(commands[0], drawn);
+    const Words render{
+        "render", "a.splats", "-o", "picture.png", "--scalar-bar", "--size", valueOf(commands[0], "--size")};
+    const Seen window = seenBy(commands[0]), expected = seenBy(render + camera);
+    EXPECT_GT(glm::dot(window.towards, expected.towards), 0.9995) << testing::PrintToString(commands[0]);
+    EXPECT_GT(glm::dot(window.up, expected.up), 0.9995) << testing::PrintToString(commands[0]);
+    EXPECT_NEAR(window.half_height / expected.half_height, 1, 0.1) << testing::PrintToString(commands[0]);
+  }
+  expectRefused({"view", "a.splats", "--view", "+x", "--position", "1,2,3"}, 2,
+                {"--view cannot be combined with --position"});
+  expectRefused({"view", "a.splats", "--look-at", "3,4", "--from-height", "9"}, 1, {"--globe"});
+}
 
 /// A large window's isosurface takes more than the usual memory, which it gets; a limit that was given stays.
 TEST_F(WindowPictures, GetTheMemoryThatTheyNeed) {

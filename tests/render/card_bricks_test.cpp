@@ -251,6 +251,26 @@ TEST_F(CardBricksTest, GiveMemoryUpWhereThereIsLessOfIt) {
   EXPECT_EQ(few.card_splats, all.card_splats);
 }
 
+/// The textures of layers count: 16 bytes a pixel, of a picture whose bricks would fit without them.
+TEST_F(CardBricksTest, LeaveRoomForLayers) {
+  FrameOptions wanted = options(0);
+  wanted.size = {600, 500};
+  const uint64_t of_layers = 16 * wanted.size.pixels();
+  FrameStatistics card, ignored;
+  const auto stored = [&](uint64_t bytes) {
+    wanted.card_memory_bytes = bytes;
+    const Image image = egl_->render(camera("iso"), wanted, card);
+    EXPECT_GE(compareImages(image, rendererBy(Backend::kCpu)->render(camera("iso"), wanted, ignored)).psnr_db,
+              60)
+        << bytes;
+    return card.card_splats;
+  };
+  EXPECT_GT(stored(of_layers), 0u);
+  putLayers(wanted);
+  EXPECT_EQ(stored(of_layers), 0u);
+  EXPECT_EQ(stored(of_layers + 64 * kMiB), card.splats_read);
+}
+
 TEST_F(CardBricksTest, StayAwayWithoutMemory) {
   FrameStatistics statistics;
   const Image none = egl_->render(camera("iso"), options(0), statistics);

@@ -133,6 +133,18 @@ TEST_F(CardPictureTest, HasTheBytesOfThePictureThatIsRead) {
   }
 }
 
+/// The picture of 8 bits, and the colours of its layers while it is made.
+TEST_F(CardPictureTest, CountsAsMemoryOfTheCard) {
+  FrameOptions wanted = options();
+  putLayers(wanted);
+  const uint64_t pixels = wanted.size.pixels();
+  FrameStatistics read;
+  rendererFor(window_.get())->render(camera(), wanted, read);
+  drawn(wanted);
+  const uint64_t more = statistics_.card_peak_bytes - read.card_peak_bytes;
+  EXPECT_TRUE(more == (4 + 2 * 16) * pixels || more == (4 + 3 * 16) * pixels) << more;
+}
+
 TEST_F(CardPictureTest, StaysWhileLaterOnesAreDrawnAndThenGoes) {
   std::vector<std::shared_ptr<CardPicture>> pictures;
   for (const char* view : {"iso", "+z", "-x"}) pictures.push_back(drawn(options(), view));

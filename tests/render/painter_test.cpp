@@ -474,6 +474,31 @@ TEST(GlTilePainter, HasTheSameBitsInAnyBatchesAndBoxes) {
   });
 }
 
+/// An opaque layer behind all: four depths a pixel, and the bounds of cells of 8, 16, 32, 64 and 128 pixels.
+TEST(GlTilePainter, CountsTheLayersAsMemoryOfTheCard) {
+  const ImageSize size{70, 50};
+  const auto table = lively();
+  std::vector<PixelLayers::Row> rows(static_cast<size_t>(size.height));
+  for (PixelLayers::Row& row : rows)
+    for (int x = 0; x < size.width; ++x) {
+      row.layers.push_back({1e6f, glm::vec4(1)});
+      row.endPixel(row.layers.size() - 1);
+    }
+  const PixelLayers layers(size, std::move(rows), 0);
+  GlThread gl(GlLibrary::kEgl);
+  gl.run([&](const GlContext& context) {
+    const auto bytesWith = [&](const PixelLayers* of_pixels) {
+      GlTilePainter painter(context);
+      painter.begin(size, kWhite, table, {.layers = of_pixels});
+      painter.draw(leaning(250, size));
+      painter.end();
+      return painter.cardWork().bytes;
+    };
+    constexpr uint64_t kCells = 9 * 7 + 5 * 4 + 3 * 2 + 2 * 1 + 1;
+    EXPECT_EQ(bytesWith(&layers) - bytesWith(nullptr), 16 * size.pixels() + 8 * kCells);
+  });
+}
+
 TEST(GlTilePainter, DrawsRegionsAsTheWhole) {
   const ImageSize size{70, 50};
   const auto table = lively();
@@ -534,14 +559,15 @@ TEST(GlTilePainter, CountsWhatPixelsDo) {
     }
   GlThread gl(GlLibrary::kEgl);
   gl.run([&](const GlContext& context) {
-    for (const bool counts : {false, true}) {
-      if (counts) setenv("CURVISPLAT_COUNT_PIXELS", "1", 1);
+    for (const std::string asked : {"", "1", "alone"}) {
+      setenv("CURVISPLAT_COUNT_PIXELS", asked.c_str(), 1);
       GlTilePainter painter(context);
       unsetenv("CURVISPLAT_COUNT_PIXELS");
       for (const uint64_t copies : {3, 1}) {
-        drawn(painter, std::vector<ScreenSplat>(copies, splat), lively(), size);
+        const Image image = drawn(painter, std::vector<ScreenSplat>(copies, splat), lively(), size);
+        EXPECT_EQ(image.pixel(21, 17)[2] == 1.0f, asked == "alone");  // white, where nothing is blended
         const CardWork work = painter.cardWork();
-        EXPECT_EQ(work.pixels_blended, counts ? copies * inside : 0);
+        EXPECT_EQ(work.pixels_blended, asked.empty() ? 0 : copies * inside);
         // Each pixel of a tile of 16 looks at all splats of its list.
         EXPECT_EQ(work.pixels_listed % (16 * 8), 0u);
         EXPECT_LE(work.pixels_listed, 256 * work.entries);

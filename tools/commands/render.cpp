@@ -216,13 +216,13 @@ void render(const RenderArguments& given) {
   const ShownBox box =
       withGrid(shownBox(manifest, options.scale, options.clip_box, arguments.annotations.shown), box_on_globe,
                options.scale);
-  const CameraArguments camera =
-      choice.picture.camera(placedAbove(arguments.camera, globe, options.scale), transfer_function,
-                            {box, options.size, has_box || options.clip_box.has_value(),
-                             boxOnEarth(arguments.surfaces.map, cache, globe)});
+  const CameraArguments camera = choice.picture.camera(
+      placedAbove(framesOf(arguments.camera, steps), globe, options.scale), transfer_function,
+      {box, options.size, has_box || options.clip_box.has_value(),
+       boxOnEarth(arguments.surfaces.map, cache, globe)});
   choice.picture.release();
-  const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), box, options.size), series,
-                                     arguments.steps, steps, arguments.camera.frames);
+  const MotionInTime motion = inTime(chooseCameraMotion(camera, box, options.size), series, arguments.steps,
+                                     steps, arguments.camera.frames);
   const std::vector<uint64_t> numbers =
       (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
   // A rank has a picture to itself where there are enough of them.
@@ -256,7 +256,7 @@ void render(const RenderArguments& given) {
   const auto noteBackend = [&] {
     if (player.renderer().backendName() == report.backend) return;
     report.backend = player.renderer().backendName();
-    printMessage("warning: OpenGL could not go on; drawn by {}", report.backend);
+    printMessageOfRank(fmt::format("warning: OpenGL could not go on; drawn by {}", report.backend));
   };
   const auto writeReport = [&] {
     if (!arguments.statistics.empty() && ranks.isFirst())
@@ -416,22 +416,7 @@ void addRender(CLI::App& app) {
   addCameraOptions(*command, *camera, where,
                    "; it fits the data, or what --clip-box leaves of them (default: chosen from the data; "
                    "iso for a camera that moves)");
-  command
-      ->add_option(
-          "--position", camera->position,
-          "Camera position x,y,z, in coordinates after --scale. Alone it looks at the data's centre, "
-          "z up, and fits the data into the picture")
-      ->group(where);
-  command
-      ->add_option("--focal-point", camera->focal_point,
-                   "Point x,y,z the camera looks at (default: the data's centre)")
-      ->group(where);
-  command->add_option("--view-up", camera->view_up, "Up direction x,y,z of the picture (default 0,0,1)")
-      ->group(where);
-  command
-      ->add_option("--parallel-scale", camera->parallel_scale,
-                   "Half the picture's height in world units (default: fits the data)")
-      ->group(where);
+  addPlaceOptions(*command, *camera, where);
   addLookAtOptions(*command, *camera, where);
   command
       ->add_option("--orbit", camera->orbit,

@@ -28,6 +28,7 @@
 #include "tools/options/kept_caches.h"
 #include "tools/options/kept_conversion.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/picture_choice.h"
 #include "tools/options/point_values.h"
 #include "tools/options/scene_arguments.h"
 #include "tools/options/shared_options.h"
@@ -48,6 +49,7 @@ struct ViewArguments {
   std::optional<std::string> scalar, memory, frame_time;
   SurfaceArguments surfaces;
   StepArguments steps;
+  CameraArguments camera;
 };
 
 /// The options of lines, points and the Earth, as `render` takes them.
@@ -92,6 +94,21 @@ void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerO
         boxOnEarth(arguments.surfaces.map, cache, globeOf(arguments.surfaces.globe, cache.manifest()));
   }
   options.given = std::make_shared<GivenSheets>(std::move(given));
+}
+
+/// The camera that `render` draws the state with, by the same options.
+Camera cameraOf(const ViewArguments& arguments, const CacheReader& cache, const ViewState& state,
+                ImageSize size) {
+  const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, cache.manifest());
+  const ShownBox box = shownBox(cache.manifest(), state.scale, state.clip_box, state.annotations);
+  const bool whole = state.annotations.lieBehind() || state.clip_box;
+  const EditedFunction& function = state.opacity_by ? state.opacity_by->function : state.function;
+  // One for all steps, as that of the window.
+  PictureChoice choice(cache, cache.variableNamed(state.opacityScalar()), state.scale, ChosenFor::kSeries);
+  const CameraArguments camera =
+      choice.camera(placedAbove(arguments.camera, globe, state.scale), function.function(),
+                    {box, size, whole, state.given ? state.given->above : std::nullopt});
+  return chooseCameraMotion(camera, box, size).camera(0);
 }
 
 FaceServices faceServices() {
@@ -175,6 +192,11 @@ void view(const ViewArguments& arguments) {
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
   if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
   checkSurfaceArguments(arguments.surfaces);
+  checkCameraArguments(arguments.camera);
+  if (arguments.camera.place() || arguments.camera.turn() || arguments.camera.zoom)
+    options.camera = [&](const CacheReader& of, const ViewState& state, ImageSize data) {
+      return cameraOf(arguments, of, state, data);
+    };
   for (const std::string& surface : arguments.surfaces.surfaces)
     if (isVtp(surface))
       throw UsageError("--surface {}: the window shows STL, PLY and OBJ files; render draws .vtp files",
@@ -224,6 +246,11 @@ void addView(CLI::App& app) {
   addFrameTimeOption(*command, arguments->frame_time, " (default: 33)");
   addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
   addStepOptions(*command, arguments->steps, "Time steps");
+  const std::string where = "Camera";
+  addCameraOptions(*command, arguments->camera, where,
+                   "; it fits the data (default of all: as last time, initially chosen from the data)");
+  addPlaceOptions(*command, arguments->camera, where);
+  addLookAtOptions(*command, arguments->camera, where);
   command->callback([arguments] { view(*arguments); });
 }
 

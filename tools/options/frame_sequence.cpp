@@ -90,6 +90,20 @@ void addCameraOptions(CLI::App& command, CameraArguments& arguments, const std::
   add("--zoom", arguments.zoom, "Show everything this many times as large; below 1, smaller");
 }
 
+void addPlaceOptions(CLI::App& command, CameraArguments& arguments, const std::string& group) {
+  const auto add = [&](const char* name, std::optional<std::string>& value, const char* help) {
+    command.add_option(name, value, help)->group(group);
+  };
+  add("--position", arguments.position,
+      "Camera position x,y,z, in coordinates after --scale. Alone it looks at the data's centre, z up, and "
+      "fits "
+      "the data into the picture");
+  add("--focal-point", arguments.focal_point, "Point x,y,z the camera looks at (default: the data's centre)");
+  add("--view-up", arguments.view_up, "Up direction x,y,z of the picture (default 0,0,1)");
+  add("--parallel-scale", arguments.parallel_scale,
+      "Half the picture's height in world units (default: fits the data)");
+}
+
 void checkCameraArguments(const CameraArguments& arguments) {
   if (arguments.view && (arguments.position || arguments.view_up))
     throw UsageError("--view cannot be combined with --position or --view-up");
@@ -125,6 +139,28 @@ void checkCameraArguments(const CameraArguments& arguments) {
   if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
 }
 
+namespace {
+
+/// The placed camera at a frame of its orbit, rolled.
+std::function<Camera(const Camera& placed, uint64_t frame)> turnOf(const CameraArguments& arguments) {
+  const double degrees = degreesOf("--orbit", arguments.orbit), roll = degreesOf("--roll", arguments.roll);
+  return [=, frames = static_cast<double>(arguments.frameCount())](const Camera& placed, uint64_t frame) {
+    return rolled(orbited(placed, degrees * static_cast<double>(frame) / frames), roll);
+  };
+}
+
+}  // namespace
+
+std::optional<double> fittingScale(const CameraArguments& arguments, const ShownBox& box, ImageSize size) {
+  if (arguments.parallel_scale || arguments.view_angle || !arguments.path.empty()) return std::nullopt;
+  const Camera placed = placedCamera(arguments, box, size);
+  double scale = placed.parallel_scale;
+  const auto turned = turnOf(arguments);
+  for (uint64_t frame = 0; arguments.orbit && frame < arguments.frameCount(); ++frame)
+    scale = std::max(scale, turned(placed, frame).parallelScaleFor(box.lower, box.upper, size));
+  return scale;
+}
+
 CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox& box, ImageSize size) {
   const uint64_t frames = arguments.frameCount();
   if (!arguments.path.empty()) {
@@ -138,19 +174,14 @@ CameraMotion chooseCameraMotion(const CameraArguments& arguments, const ShownBox
     return motion;
   }
   Camera first = placedCamera(arguments, box, size);
-  const double degrees = degreesOf("--orbit", arguments.orbit), roll = degreesOf("--roll", arguments.roll);
+  if (const auto scale = fittingScale(arguments, box, size)) first.parallel_scale = *scale;
   const double zoom = arguments.zoom ? parsePositive("--zoom", *arguments.zoom) : 1;
   if (first.projection == Projection::kPerspective && !(first.view_angle_deg / zoom < 180))
     throw UsageError("--zoom {}: the view angle of {:g} degrees becomes {:g}; expected fewer than 180",
                      *arguments.zoom, first.view_angle_deg, first.view_angle_deg / zoom);
-  const auto rolledAt = [=](const Camera& placed, uint64_t frame) {
-    return rolled(orbited(placed, degrees * static_cast<double>(frame) / static_cast<double>(frames)), roll);
+  const auto at = [=, turned = turnOf(arguments)](uint64_t frame) {
+    return magnified(turned(first, frame), zoom);
   };
-  if (arguments.orbit && !arguments.parallel_scale && first.projection == Projection::kOrthographic)
-    for (uint64_t frame = 0; frame < frames; ++frame)  // one scale that fits the data into every frame
-      first.parallel_scale =
-          std::max(first.parallel_scale, rolledAt(first, frame).parallelScaleFor(box.lower, box.upper, size));
-  const auto at = [=](uint64_t frame) { return magnified(rolledAt(first, frame), zoom); };
   if (!arguments.orbit) return {1, [camera = at(0)](uint64_t) { return camera; }, {}};
   return {frames, at, {}};
 }

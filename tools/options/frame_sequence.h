@@ -54,6 +54,9 @@ struct CameraArguments {
 void addCameraOptions(CLI::App& command, CameraArguments& arguments, const std::string& group,
                       const std::string& note);
 
+/// Adds --position, --focal-point, --view-up and --parallel-scale under the heading `group`.
+void addPlaceOptions(CLI::App& command, CameraArguments& arguments, const std::string& group);
+
 /// Throws UsageError if options contradict each other; needs no cache.
 void checkCameraArguments(const CameraArguments& arguments);
 
@@ -71,6 +74,10 @@ struct CameraMotion {
   /// The function and cuts of a film at a frame, if it states any; else an empty function.
   std::function<KeyLook(uint64_t frame)> look = {};
 };
+
+/// The scale at which an orthographic camera shows the whole box in all its frames; nullopt where the arguments leave no
+/// scale open. Requires and throws as chooseCameraMotion().
+std::optional<double> fittingScale(const CameraArguments& arguments, const ShownBox& box, ImageSize size);
 
 /// The camera of each frame. Requires that checkCameraArguments() accepted the arguments. What they leave
 /// open is chosen so that the whole box is seen. Azimuth, elevation, orbit, roll and zoom change the camera

@@ -306,7 +306,16 @@ glm::dvec3 placeForOrbit(const Camera& camera, const PictureChoice::Framing& fra
 
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
                                       const Framing& framing) {
-  if (arguments.place()) return arguments;
+  if (!arguments.place()) place(arguments, function, framing);
+  if (const auto scale = fittingScale(arguments, framing.box, framing.size)) {
+    arguments.parallel_scale = exact(*scale);
+    add("--parallel-scale", *arguments.parallel_scale);
+  }
+  return arguments;
+}
+
+void PictureChoice::place(CameraArguments& arguments, const TransferFunction& function,
+                          const Framing& framing) {
   const auto& [box, size, whole, above] = framing;
   const auto exactPoint = [](const glm::dvec3& point) {
     return fmt::format("{},{},{}", point.x, point.y, point.z);
@@ -321,12 +330,13 @@ CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferF
     say("--view-up", arguments.view_up, exactPoint(camera.view_up));
     say("--focal-point", arguments.focal_point, exactPoint(camera.focal_point));
     say("--view-angle", arguments.view_angle, exact(camera.view_angle_deg));
-    return arguments;
+    return;
   }
   const bool orbits = arguments.orbit.has_value();
   const ViewChoice choice =
       data().view(function, size, whole || orbits ? Framed::kBox : Framed::kSeen, box.lower, box.upper);
-  if (orbits && !choice.position) return arguments;  // around a side of thin data, it would be seen edge-on
+  // Around a side of thin data, it would be seen edge-on.
+  if (orbits && !choice.position) return say("--view", arguments.view, "iso");
   Camera camera = cameraOf(choice, box.lower, box.upper, size);
   if (orbits) camera.position = placeForOrbit(camera, framing);
   say("--position", arguments.position, exactPoint(camera.position));
@@ -336,7 +346,6 @@ CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferF
     say("--view-angle", arguments.view_angle, exact(kChosenViewAngle));
   else if (choice.focal_point)
     say("--parallel-scale", arguments.parallel_scale, exact(choice.parallel_scale));
-  return arguments;
 }
 
 }  // namespace curvisplat

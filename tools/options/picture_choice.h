@@ -66,7 +66,8 @@ class PictureChoice {
     std::optional<AnnotatedScene::OnGlobe> above =
         std::nullopt;  // data around an Earth that hides what is behind it
   };
-  /// The arguments, with a camera chosen from the data if they do not place one. `function`: the picture's.
+  /// The arguments, with a camera chosen from the data if they do not place one, and the scale that fits if they leave it
+  /// open. `function`: the picture's.
   CameraArguments camera(CameraArguments arguments, const TransferFunction& function, const Framing& framing);
 
   /// Frees what it has read of the data: some 15 MiB, which no frame's budget counts. Call it before frames
@@ -77,6 +78,7 @@ class PictureChoice {
   const std::string& chosenOptions() const { return chosen_; }
 
  private:
+  void place(CameraArguments& arguments, const TransferFunction& function, const Framing& framing);
   const FirstChoice& data();
   VariableInfo info() const { return variableFor(cache_, variable_, what_); }
   std::pair<double, double> parseRange(const ScalarArguments& arguments);

@@ -58,6 +58,19 @@ std::string fieldOf(const std::string& option, const std::string& text, std::str
       option, text, name, didYouMean(name, known));
 }
 
+/// Removes from the end of `filled` what stands before a unit that there is none of: an opening bracket, blanks, and "in".
+/// Returns whether it was a bracket.
+bool removeBeforeUnits(std::string& filled) {
+  const auto removeBlanks = [&] { filled.resize(filled.find_last_not_of(' ') + 1); };
+  const bool has_bracket = filled.ends_with('[') || filled.ends_with('(');
+  if (has_bracket) filled.pop_back();
+  removeBlanks();
+  if (has_bracket || !(filled == "in" || filled.ends_with(" in"))) return has_bracket;
+  filled.resize(filled.size() - 2);
+  removeBlanks();
+  return false;
+}
+
 }  // namespace
 
 std::string filledText(const std::string& option, const std::string& text, const TextFields& fields) {
@@ -69,8 +82,12 @@ std::string filledText(const std::string& option, const std::string& text, const
       const size_t end = text.find('}', n);
       if (end == std::string::npos)
         throw UsageError("{} {}: has a {{ without its }}; {{{{ is a brace", option, text);
-      filled += fieldOf(option, text, std::string_view(text).substr(n + 1, end - n - 1), fields);
+      const std::string_view field = std::string_view(text).substr(n + 1, end - n - 1);
+      filled += fieldOf(option, text, field, fields);
       n = end;
+      if (field == "units" && fields.units.empty() && removeBeforeUnits(filled) && n + 1 < text.size() &&
+          (text[n + 1] == ']' || text[n + 1] == ')'))
+        ++n;
       continue;
     }
     if ((c == '{' || c == '}') && doubled) ++n;

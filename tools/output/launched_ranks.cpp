@@ -166,6 +166,13 @@ StopRanksWith::~StopRanksWith() {
   ranks_.whileWaiting({});
 }
 
+void printMessageOfRank(const std::string& text) {
+  if (!started || started->alone()) return printMessage("{}", text);
+  muteMessages(false);
+  printMessage("rank {} of {} ({}): {}", started->rank(), started->count(), hostName(), text);
+  muteMessages(!started->isFirst());
+}
+
 void endRanksAfter(const std::string& line, int status) {
   if (!started || started->alone()) return;
   using namespace std::chrono_literals;
@@ -179,8 +186,7 @@ void endRanksAfter(const std::string& line, int status) {
                        (was_stopped && !started->isFirst()));
   transport.announceFailure();
   if (!silent) {
-    muteMessages(false);
-    printMessage("rank {} of {} ({}): {}", started->rank(), started->count(), hostName(), line);
+    printMessageOfRank(line);
   }
   // The others see the announcement and remove their files; whoever does not in this time, which is long enough for a
   // machine with much other work, is ended by a signal. The one that prints ends the job: those that are silent wait for it.

@@ -44,6 +44,9 @@ class StopRanksWith {
 /// prints.
 void endRanksAfter(const std::string& line, int status);
 
+/// Prints what concerns this rank alone, whichever it is: with its number where there are several.
+void printMessageOfRank(const std::string& text);
+
 /// Ends the ranks in good order, if some were started.
 void finishRanks();
 

@@ -113,6 +113,8 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   if (options.scene) takeScene(options, cache, state);
   loadSurfaces(state);
   removeMissingFaces(options.faces, cache, state);
+  if (options.camera)
+    state.camera = options.camera(cache, state, dataSizeOf(state, cache.manifest(), picture));
   std::vector<std::string> faces;
   if (options.faces.names) faces = options.faces.names(cache);
   std::vector<std::string> elsewhere = scalarsElsewhere(cache);

@@ -47,6 +47,9 @@ struct ViewerOptions {
   std::string faces_by;                              // --surface-by
   std::shared_ptr<const GivenSheets> given;          // of the scene, what lists do not have
   FaceServices faces;
+  /// The camera to begin with, for a picture of the data in a size; empty: that of the state. Throws UsageError if the data do not
+  /// suit the options.
+  std::function<Camera(const CacheReader&, const ViewState&, ImageSize)> camera;
   std::optional<uint64_t> memory_bytes;
   ConversionServices conversion;
   OpenMovieOutput open_movie;
