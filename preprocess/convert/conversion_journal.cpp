@@ -245,8 +245,9 @@ json jsonOf(const ScatteredSplats& splats) {
 ScatteredSplats splatsOf(const JsonField& from) {
   ScatteredSplats splats;
   splats.survey = surveyOf(from.at("survey"));
-  splats.counts = {from.at("degenerate").count(), from.at("inverted").count(), from.at("halved").count(),
-                   from.at("hanging").count()};
+  splats.counts = {from.at("degenerate").count(), from.at("inverted").count(), from.at("halved").count(), 0};
+  if (const auto hanging = from.find("hanging"))
+    splats.counts.hanging = hanging->count();  // older programs fitted none
   splats.overlap = from.at("overlap").text();
   splats.merged_nodes = from.at("merged_nodes").count();
   splats.sample_file = from.at("sample").text();

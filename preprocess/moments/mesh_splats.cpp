@@ -263,7 +263,8 @@ void fitAtHangingNode(std::span<const OuterPlane> outer, NodeSplat& of_point, st
   splat.position -= shift * aside;
   for (SplatScalar& value : values) {
     const glm::dvec3 gradient = gradientOf(before, value.slope);
-    value.mean -= shift * glm::dot(gradient, aside);
+    // Towards the point, whose value it has: no value beyond those of the samples around comes out.
+    value.mean -= std::max(shift, 0.0) * glm::dot(gradient, aside);
     value.slope = gradient * splat.factor();
   }
 }

@@ -41,10 +41,12 @@ constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // Larger buffers do not make a frame faster: they only even out bricks that take different times.
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
-constexpr uint64_t kMaxWaitingBytes = 384 << 20;
-// The bytes of a waiting splat in the queues of tiles (render/tiles/tile_queues.h) and prepared.
+constexpr uint64_t kMaxWaitingBytes = 256 << 20;
+// The bytes of a waiting splat: in the queues of tiles (render/tiles/tile_queues.h) and prepared, or twice in a batch for
+// compute shaders, whichever is more.
 constexpr uint64_t kWaitingSplatBytes =
-    sizeof(ScreenSplat) + sizeof(uint64_t) + PaintResources::kPreparedBytesASplat;
+    sizeof(uint64_t) +
+    std::max<uint64_t>(sizeof(ScreenSplat) + PaintResources::kPreparedBytesASplat, 2 * sizeof(ScreenSplat));
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
 // picture of a slightly different size then needs no new pools, and the cache keeps its bricks.
 constexpr uint64_t kParts = 16;

@@ -193,7 +193,7 @@ TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {
 /// A licence is not listed with the files.
 TEST_F(WindowOpening, ShiftTakesTheFilesBetween) {
   fs::create_directory("between");
-  run({"generate", "wake", "--size", "24x16x12", "--steps", "3", "-o", "between/s"});
+  run({"generate", "wake", "--size", "24x16x12", "--steps", "3", "-o", "between/t"});
   std::ofstream("between/LICENSE") << "text";
   std::ofstream("between/z.xyz") << "another grid";
   openWith({});
@@ -201,9 +201,9 @@ TEST_F(WindowOpening, ShiftTakesTheFilesBetween) {
   placeOf("file name");
   act({"type", "between"});
   press("Return");
-  click("file s.xyz");
+  click("file t.xyz");
   EXPECT_FALSE(hasWidget("file LICENSE"));
-  moveTo(placeOf("file s_0002.fun"));
+  moveTo(placeOf("file t_0002.fun"));
   act({"keydown", "shift", "click", "1", "keyup", "shift"});
   click("file accept");
   placeOf("curve");

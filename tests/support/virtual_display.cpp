@@ -97,7 +97,9 @@ class VirtualDisplay::Server {
     const auto listens = [&] { return fs::exists(sockets + std::to_string(number)); };
     if (!eventually(listens)) throw std::runtime_error("Xvfb does not start");
     setenv("DISPLAY", name_.c_str(), 1);
-    runXdotool({"getmouselocation"});  // answered once all is ready
+    // Its socket is there a little before it listens.
+    const auto answers = [] { return RunningProgram({"getmouselocation"}, "xdotool").wait().status == 0; };
+    if (!eventually(answers)) throw std::runtime_error("Xvfb does not answer");
   }
   ~Server() {
     process_->signal(SIGTERM);  // it takes its socket away

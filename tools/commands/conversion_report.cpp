@@ -61,8 +61,9 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
     fmt::print("{} samples{}; estimated from {} of them, converted in {}:\n", forecast.samples, of_steps,
                forecast.sampled, estimatedTime(forecast.sampling_seconds));
   else
-    fmt::print("{} samples{}; estimated from its cells, and from conversions of other unstructured grids:\n",
-               forecast.samples, of_steps);
+    fmt::print(
+        "{} samples{}; estimated from its cells, and from conversions of other unstructured grids{}:\n",
+        forecast.samples, of_steps, forecast.steps > 1 ? ", if it does not move" : "");
   const double each = static_cast<double>(forecast.cache_bytes) / samples;
   printLine("  cache      {} in {}{}, {} bytes per sample{}", size(forecast.cache_bytes), output.string(),
             freeText(output),
@@ -182,6 +183,7 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   GridDescription whole, part;
   SeriesInput sample = input;
   sample.count = std::min<uint64_t>(2, input.count);
+  sample.scalars = [&](const GridDescription&) { return with_scalars.scalars; };
   sample.open = [&](uint64_t step) {
     std::unique_ptr<GridSource> grid = requireGrid(input.open(step), "cannot follow a structured step");
     whole = grid->description();

@@ -96,7 +96,7 @@ void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerO
   options.given = std::make_shared<GivenSheets>(std::move(given));
 }
 
-/// The camera that `render` draws the state with, by the same options.
+/// The camera that `render` draws the state with by the same options, but for the axes grid of a globe.
 Camera cameraOf(const ViewArguments& arguments, const CacheReader& cache, const ViewState& state,
                 ImageSize size) {
   const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, cache.manifest());
@@ -193,6 +193,9 @@ void view(const ViewArguments& arguments) {
   if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
   checkSurfaceArguments(arguments.surfaces);
   checkCameraArguments(arguments.camera);
+  // Wrong numbers are refused before a grid is converted; what --look-at says needs the globe.
+  if (!arguments.camera.look_at)
+    chooseCameraMotion(arguments.camera, {glm::dvec3(0.0), glm::dvec3(1.0)}, options.size);
   if (arguments.camera.place() || arguments.camera.turn() || arguments.camera.zoom)
     options.camera = [&](const CacheReader& of, const ViewState& state, ImageSize data) {
       return cameraOf(arguments, of, state, data);

@@ -58,23 +58,25 @@ std::string fieldOf(const std::string& option, const std::string& text, std::str
       option, text, name, didYouMean(name, known));
 }
 
-/// Removes from the end of `filled` what stands before a unit that there is none of: an opening bracket, blanks, and "in".
-/// Returns whether it was a bracket.
-bool removeBeforeUnits(std::string& filled) {
-  const auto removeBlanks = [&] { filled.resize(filled.find_last_not_of(' ') + 1); };
-  const bool has_bracket = filled.ends_with('[') || filled.ends_with('(');
-  if (has_bracket) filled.pop_back();
+/// Removes from the end of `filled` what stands before a unit that there is none of: the opening bracket of a pair around it, or
+/// "in"; and blanks. All after `begin`, where the last field ends.
+void removeBeforeUnits(std::string& filled, size_t begin, bool in_brackets) {
+  const auto removeBlanks = [&] {
+    while (filled.size() > begin && filled.back() == ' ') filled.pop_back();
+  };
+  if (in_brackets) filled.pop_back();
   removeBlanks();
-  if (has_bracket || !(filled == "in" || filled.ends_with(" in"))) return has_bracket;
+  const std::string_view before = std::string_view(filled).substr(begin);
+  if (in_brackets || !(before.ends_with(" in") || (begin == 0 && before == "in"))) return;
   filled.resize(filled.size() - 2);
   removeBlanks();
-  return false;
 }
 
 }  // namespace
 
 std::string filledText(const std::string& option, const std::string& text, const TextFields& fields) {
   std::string filled;
+  size_t end_of_field = 0;
   for (size_t n = 0; n < text.size(); ++n) {
     const char c = text[n];
     const bool doubled = n + 1 < text.size() && text[n + 1] == c;
@@ -85,9 +87,14 @@ std::string filledText(const std::string& option, const std::string& text, const
       const std::string_view field = std::string_view(text).substr(n + 1, end - n - 1);
       filled += fieldOf(option, text, field, fields);
       n = end;
-      if (field == "units" && fields.units.empty() && removeBeforeUnits(filled) && n + 1 < text.size() &&
-          (text[n + 1] == ']' || text[n + 1] == ')'))
-        ++n;
+      if (field == "units" && fields.units.empty()) {
+        const char opened = filled.size() > end_of_field ? filled.back() : ' ';
+        const char next = end + 1 < text.size() ? text[end + 1] : ' ';
+        const bool in_brackets = (opened == '[' && next == ']') || (opened == '(' && next == ')');
+        removeBeforeUnits(filled, end_of_field, in_brackets);
+        n += in_brackets;
+      }
+      end_of_field = filled.size();
       continue;
     }
     if ((c == '{' || c == '}') && doubled) ++n;

@@ -368,8 +368,10 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   if (state.annotations.axes) words.add("--axes");
   if (state.annotations.axes_grid) words.add("--axes-grid");
   if (state.annotations.outline) words.add("--outline");
+  const double largest =
+      std::max({state.scale.x, state.scale.y, state.scale.z, 1.0});  // points are before --scale
   for (const Marker& marker : state.markers)
-    words.add("--marker", fmt::format("{}:{}", numbers(marker.point, halfHeight(state.camera)),
+    words.add("--marker", fmt::format("{}:{}", numbers(marker.point, halfHeight(state.camera) / largest),
                                       signOf(marker, state.variable)));
   if (!state.title.empty()) words.add("--title", withoutFields(state.title));
   if (state.annotations.text_size > 0) words.add("--text-size", number(state.annotations.text_size));
