@@ -105,7 +105,7 @@ def axes_of(view):
 
 def depths_of(blocks, middle, scale, points):
     """The volume that lies behind each square of the picture, of each view: points in all cells, each with its share of the volume. They
-    are those of a sequence of low discrepancy along all axes and along any two, so that none line up with squares."""
+    are those of a sequence of low discrepancy, which each cell begins elsewhere, so that the points of many cells do not line up."""
     count = PIXELS // BLOCK
     sums = {view: np.zeros(count * count) for view in VIEWS}
     to_squares = np.concatenate([axes_of(view)[:2] for view in VIEWS]) * count / (2 * scale)
@@ -113,9 +113,9 @@ def depths_of(blocks, middle, scale, points):
     per_cell = max(64, -(-points // sum(len(corners) for corners in cells_of_blocks)))
     for corners in cells_of_blocks:
         terms = coefficients(corners)
-        first = np.arange(len(corners)) * float(per_cell)
+        begin = np.random.default_rng(1).random((3, len(corners)))
         for n in range(per_cell):
-            u, v, w = ((first + n) * prime ** 0.5 % 1 for prime in (2, 3, 5))
+            u, v, w = ((begin[axis] + n * 1.2207440846057596 ** (-axis - 1)) % 1 for axis in range(3))
             part = determinant(terms, u, v, w) / per_cell
             places = (to_squares @ (trilinear(terms, u, v, w) - middle[:, None]) + count / 2).astype(int)
             for view, x, y in zip(VIEWS, places[::2], places[1::2]):

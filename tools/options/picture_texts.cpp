@@ -68,7 +68,8 @@ void removeBeforeUnits(std::string& filled, size_t begin, bool in_brackets) {
   removeBlanks();
   const std::string_view before = std::string_view(filled).substr(begin);
   if (in_brackets || !(before.ends_with(" in") || (begin == 0 && before == "in"))) return;
-  filled.resize(filled.size() - 2);
+  filled.pop_back();
+  filled.pop_back();
   removeBlanks();
 }
 
