@@ -110,7 +110,7 @@ class Pictures(PythonTest):
 
     def test_have_every_option_of_the_command(self):
         own_names = {"-o": "", "tf": "colours", "clip-plane": "clip_planes", "surface": "surfaces", "surface-colour": "surface_colours",
-                     "slice": "slices", "iso": "isovalues", "scalar-bar-title": "scalar_bar_titles"}
+                     "slice": "slices", "iso": "isovalues", "scalar-bar-title": "scalar_bar_titles", "marker": "markers"}
         # Of grids, of several frames (orbit() has their cameras), of files; and what is not drawn unless it is asked for.
         others = {"help", "help-all", "value-precision", "output", "steps", "orbit", "path", "frames", "frame-rate", "part", "first-image",
                   "stats", "trace", "no-scalar-bar"}
