@@ -110,7 +110,7 @@ class Pictures(PythonTest):
 
     def test_have_every_option_of_the_command(self):
         own_names = {"-o": "", "tf": "colours", "clip-plane": "clip_planes", "surface": "surfaces", "surface-colour": "surface_colours",
-                     "slice": "slices", "iso": "isovalues", "scalar-bar-title": "scalar_bar_titles"}
+                     "slice": "slices", "iso": "isovalues", "scalar-bar-title": "scalar_bar_titles", "marker": "markers"}
         # Of grids, of several frames (orbit() has their cameras), of files; and what is not drawn unless it is asked for.
         others = {"help", "help-all", "value-precision", "output", "steps", "orbit", "path", "frames", "frame-rate", "part", "first-image",
                   "stats", "trace", "no-scalar-bar"}
@@ -154,6 +154,12 @@ class Pictures(PythonTest):
             self.expect_same(cache.render(size=(160, 120), scalar_bar_titles="speed", axes_titles=("x [m]", "y [m]", "z [m]")),
                              "--scalar-bar-title", "speed", "--axes-titles", "x [m],y [m],z [m]")
             self.expect_same(cache.render(size=(160, 120), axes_grid=True, background="black"), "--axes-grid", "--background", "black")
+            marked = cache.render(size=(160, 120), markers=[((1, 0.5, 0.25), "here: {1}"), ((-1, 0, 0), "")])
+            self.expect_same(marked, "--marker", "1,0.5,0.25:here: {1}", "--marker", "-1,0,0")
+            self.assertFalse(np.array_equal(marked, cache.render(size=(160, 120))))
+            for wrong in ("1,0,0:a", [(1, 0, 0)], [((1, 0), "a")]):
+                with self.assertRaisesRegex(curvisplat.UsageError, "markers: "):
+                    cache.render(size=(32, 32), markers=wrong)
 
     def test_have_channels_and_are_saved_with_them(self):
         with curvisplat.open(self.cache) as cache:

@@ -390,12 +390,14 @@ def saves_pictures(tab):
     expect(tab.run("document.getElementById('status').textContent") == "saved annulus.png, 1920 x 1080 pixels", "its size is said")
     expect(rest(tab) == before, "the view is as it was")
     set_value(tab, "#save-size", "")
+    tab.run("document.getElementById('save').click()")
+    tab.wait("window.saves.length === 3", "the picture as it is now")
     # A marker is in what is saved, and by a sign of the page in what is shown.
     point = tab.run("cache.lower.map((v, n) => (v + cache.upper[n]) / 2)")
     tab.run(f"state.markers.push({{ name: 'here', point: {json.dumps(point)}, scalar: state.variable, unit: '', value: 0.5, block: 0, i: 0, j: 0, k: 0 }}); showMarkers()")
     press(tab, "#save")
-    tab.wait("window.saves.length === 3", "the picture with a marker")
-    tab.run("window.pixels = null; Promise.all([0, 2].map(n => createImageBitmap(window.saves[n][1]))).then(both => { "
+    tab.wait("window.saves.length === 4", "the picture with a marker")
+    tab.run("window.pixels = null; Promise.all([2, 3].map(n => createImageBitmap(window.saves[n][1]))).then(both => { "
             "window.pixels = both.map(b => { const c = new OffscreenCanvas(b.width, b.height).getContext('2d'); c.drawImage(b, 0, 0); "
             "return [...c.getImageData(0, 0, b.width, b.height).data]; }).reduce((a, b) => a.length === b.length ? a.filter((v, n) => v !== b[n]).length : -1); })")
     found = tab.wait("window.pixels", "both pictures' pixels")

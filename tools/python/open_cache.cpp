@@ -106,6 +106,7 @@ SurfaceArguments surfaceArguments(const Options& frame, const py::dict& others) 
 AnnotationArguments annotationArguments(const Options& frame, const py::dict& others) {
   AnnotationArguments arguments;
   arguments.bar_titles = of<Texts>(others, "scalar_bar_titles");
+  arguments.markers = of<Texts>(others, "markers");
   arguments.axis_titles = given(frame, "axes_titles");
   arguments.title = given(frame, "title");
   arguments.label = given(frame, "label");

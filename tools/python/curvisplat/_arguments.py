@@ -102,6 +102,19 @@ def several(value: Any, kind: type = str) -> Sequence[Any]:
     return [value] if isinstance(value, kind) else list(value)
 
 
+def markers(value: Any, text: Callable[[Sequence[float]], str]) -> list:
+    """Markers as text: (point, text) each."""
+    what = "markers ((x, y, z), text), several in a list"
+    if isinstance(value, str):
+        raise _core.UsageError(f"markers: {value!r}; expected {what}")
+    found = []
+    for marker in value:
+        if not isinstance(marker, (tuple, list)) or len(marker) != 2 or not isinstance(marker[1], str):
+            raise _core.UsageError(f"markers: {marker!r}; expected {what}")
+        found.append(f"{text(numbers('markers', marker[0], what, 3))}:{marker[1]}")
+    return found
+
+
 def planes(name: str, value: Any, text: Callable[[Sequence[float]], str]) -> list:
     """Planes as text: (px, py, pz, nx, ny, nz) each."""
     what = "planes (px, py, pz, nx, ny, nz), several in a list"

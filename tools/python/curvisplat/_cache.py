@@ -359,7 +359,8 @@ class Cache:
                light_direction: Optional[Vector] = None, shadow: Optional[float] = None, ambient_occlusion: Optional[float] = None,
                gradient_opacity: Union[str, Sequence[Tuple[float, float]], None] = None, background: str = "dark", scalar_bar: bool = False,
                scalar_bar_titles: Union[str, Sequence[str]] = (), axes: bool = False, axes_grid: bool = False,
-               axes_titles: Optional[Sequence[str]] = None, outline: bool = False, title: Optional[str] = None,
+               axes_titles: Optional[Sequence[str]] = None, outline: bool = False, markers: Sequence[Tuple[Vector, str]] = (),
+               title: Optional[str] = None,
                label: Optional[str] = None, text_size: Optional[float] = None, lines: Union[str, Sequence[str]] = (), points: Union[str, Sequence[str]] = (),
                lines_by: str = "", lines_colour: Union[str, Sequence[str]] = (), line_width: Union[str, float] = "3px",
                point_size: Union[str, float] = "6px", lines_opacity: float = 1, lines_time: Union[str, float, None] = None,
@@ -419,8 +420,8 @@ class Cache:
         shade: light level surfaces from the viewer; light: (ambient, diffuse, specular), light_direction, shadow and
         ambient_occlusion (0..1: how dark it is where the volume keeps light out) turn it on, too. gradient_opacity: points (share of the volume that is less steep 0..1, factor of the opacity 0..1).
 
-        scalar_bar, scalar_bar_titles, axes, axes_grid, axes_titles (of x, y and z) and outline are drawn into the
-        picture, and title and label, texts with the fields {time}, {step}, {frame}, {scalar} and {units}, in a font of text_size pixels. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
+        scalar_bar, scalar_bar_titles, axes, axes_grid, axes_titles (of x, y and z), outline and markers (points with texts)
+        are drawn into the picture, and title and label, texts with the fields {time}, {step}, {frame}, {scalar} and {units}, in a font of text_size pixels. channels: some of "depth", "normal" and "scalar", taken where half of the pixel's opacity lies in front.
 
         lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level; max_splats instead draws
         the best that has no more. memory: the limit, in bytes or as "512M"; card_memory: of a
@@ -467,7 +468,8 @@ class Cache:
                   "keep_going": _arguments.flag("keep_going", keep_going), "backend": backend,
                   "scalar_bar": _arguments.flag("scalar_bar", scalar_bar),
                   "scalar_bar_titles": _arguments.several(scalar_bar_titles), "axes": _arguments.flag("axes", axes),
-                  "axes_grid": _arguments.flag("axes_grid", axes_grid), "outline": _arguments.flag("outline", outline)}
+                  "axes_grid": _arguments.flag("axes_grid", axes_grid), "outline": _arguments.flag("outline", outline),
+                  "markers": _arguments.markers(markers, _numbers)}
         if iso_opacity is not None:
             others["iso_opacity"] = _text(iso_opacity)
         rgba, *about = self._core.render({"scalar": scalar, **_function_texts(**of_function), **of_two}, _given(**of_camera), frame,
