@@ -40,7 +40,7 @@ struct OuterPlane {
 /// thicker and move on towards the larger cells. What m, the way from the point to the splat's middle, says suffices. A uniform
 /// medium was off by 3 to 6 % (rms) at planes, edges and corners of refined parts, and is by 0.3 to 1 %. Lengths across outer
 /// faces stay, which cuts are fitted for.
-void fitAtHangingNode(std::span<const OuterPlane> outer, NodeSplat& splat, std::span<SplatScalar> values);
+void fitAtHangingNode(std::span<const OuterPlane> outer, NodeSplat& of_point, std::span<SplatScalar> values);
 
 /// The neighbours of a cell: where their centres are from its own, and their values, [neighbour * fields +
 /// field].
