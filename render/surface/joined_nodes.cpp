@@ -172,8 +172,8 @@ class Joiner {
   static double lengthOf(const glm::dvec3& in_cells) {
     return std::max({std::abs(in_cells.x), 2 * std::abs(in_cells.y), 2 * std::abs(in_cells.z)});
   }
-  /// The same in lengths of the last cell along axes of thinner cells: a collapsed line's splat, which half a disc shares, lies many of
-  /// the cells around the line beside it.
+  /// Measures a way as lengthOf() does, but in lengths of the last cell along axes of thinner cells: the splat of a collapsed line,
+  /// which half a disc shares, lies many of these thin cells beside the line.
   static double lengthAcross(const Missing& missing, const glm::dvec3& way) {
     const glm::dvec3 in_cells = missing.in_cells * way;
     const glm::dmat3& cell = missing.expected.cell;

@@ -15,7 +15,8 @@ struct TextFields {
 };
 
 /// `text` with its fields filled in. A number may have a format of C's printf without its %, {time:.2f} or {frame:04d}; {{ and
-/// }} are braces. Without a unit, {units} takes brackets around it with it, and blanks and "in" before it. `option` begins the message of a UsageError: an unknown field, or a format that is none.
+/// }} are braces. Without a unit, {units} takes brackets around it with it, and blanks and "in" before it. `option` begins the
+/// message of a UsageError: an unknown field, or a format that is none.
 std::string filledText(const std::string& option, const std::string& text, const TextFields& fields);
 
 }  // namespace curvisplat

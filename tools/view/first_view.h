@@ -28,7 +28,8 @@ EditedFunction automaticFunction(const CacheReader& cache, const std::string& sc
 double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function, double share = 0.5);
 
 /// The value at which an isosurface of a scalar begins: middleOfSeen() of the opacities that the state has for it, or of its
-/// volume; where the state has an isosurface there, with another share. Reads the scalar's histogram at the cache's step. Throws UsageError if there is no such scalar, and Error as reading does.
+/// volume; where the state has an isosurface there, with another share. Reads the scalar's histogram at the cache's step. Throws
+/// UsageError if there is no such scalar, and Error as reading does.
 double firstIsovalue(const CacheReader& cache, const ViewState& state, const std::string& scalar);
 
 /// The function of another scalar, after `before`: the automatic one, with its opacities and their unit, which those of the
