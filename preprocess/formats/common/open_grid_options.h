@@ -24,6 +24,8 @@ struct Plot3dForce {
   std::optional<int> precision_bytes;  // 4 or 8
   std::optional<bool> multi_block;
   std::optional<bool> blanking;
+
+  bool operator==(const Plot3dForce& other) const = default;
 };
 
 /// How longitude and latitude become positions.

@@ -267,6 +267,12 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   if (complete.temporary_folder.empty()) complete.temporary_folder = systemTemporaryFolder();
   std::unique_ptr<DataSource> source =
       cutCurved(openInAnyOrder(complete), options.cut_curved.value_or(true), complete.temporary_folder);
+  const std::string& format = source->description().format;
+  if (options.force != Plot3dForce{} && format.find("PLOT3D") == std::string::npos)
+    throw UsageError(
+        "{}: is {}; --ascii, --binary, --byte-order, --records, --precision, --blocks and --iblank tell the "
+        "layout of PLOT3D files; leave them out",
+        complete.grid.string(), format);
   chosenTimeStep(complete.grid.string(), source->description().times, options.time_step);
   return source;
 }
