@@ -28,7 +28,7 @@
 
 #include "preprocess/formats/cgns/cgns_node.h"
 #include "preprocess/formats/common/hdf5_objects.h"
-#include "preprocess/formats/common/watched_file.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "preprocess/formats/common/hdf5_objects.h"
-#include "preprocess/formats/common/watched_file.h"
 #include "stream/base/error.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 

@@ -17,9 +17,9 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/formats/common/watched_file.h"
 #include "preprocess/formats/netcdf/netcdf_variable.h"
 #include "stream/base/file.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 
