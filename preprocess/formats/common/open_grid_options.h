@@ -34,6 +34,8 @@ struct GlobeOptions {
   Shape shape = Shape::kAutomatic;  // automatic: sphere for degrees, flat for lengths
   double radius_km = 6371;
   double vertical_scale = 1;
+
+  bool operator==(const GlobeOptions& other) const = default;
 };
 
 /// The options of openData(). Only `grid` has to be set.
