@@ -9,10 +9,10 @@
 
 namespace curvisplat {
 
-/// What a file was when it was opened. Any thread may ask.
+/// Keeps what a file was when it was opened. Any thread may ask.
 class WatchedFile {
  public:
-  /// As it is now. A file that is not there never changes, nor does a folder, which gets files of further steps.
+  /// Notes the file as it is now. One that is not there never changes, nor does a folder, which gets files of further steps.
   explicit WatchedFile(std::filesystem::path path);
 
   /// Whether the name has a file of the same length and the same time of change.

@@ -56,7 +56,7 @@ TEST_P(NetcdfDamage, FilesWithAWrongByteAreRefusedOrRead) {
   EXPECT_GT(report.refused, count / 20);
 }
 
-// libnetcdf and HDF5 read zeros beyond the end.
+// The libraries read zeros beyond the end.
 TEST_P(NetcdfDamage, FilesThatAreCutWhileTheyAreOpenAreRefused) {
   const NetcdfFile file(path_);
   const auto variable = std::ranges::find_if(

@@ -1,4 +1,4 @@
-// What a reader is told of a file that others write at the same time.
+// WatchedFile: readers are told when others write a file at the same time.
 #include "stream/base/watched_file.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ class WatchedFileTest : public testing::Test {
   static void write(const fs::path& path, const std::string& text) {
     std::ofstream(path, std::ios::binary) << text;
   }
-  /// As if a file had been written an hour later: clocks of file systems are coarse.
+  /// Writes a file as if an hour later: clocks of file systems are coarse.
   static void writeLater(const fs::path& path, const std::string& text) {
     const auto before = fs::last_write_time(path);
     write(path, text);
