@@ -24,6 +24,7 @@
 #include "stream/base/memory.h"
 #include "stream/base/name_list.h"
 #include "stream/base/text.h"
+#include "stream/base/watched_file.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/values_writer.h"
@@ -275,6 +276,7 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& giv
                            Progress& progress) {
   AddScalarOptions options = given_options;
   if (!options.ranks) options.ranks = &oneRank();
+  const WatchedFiles files(source.description().files);
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (const auto* const grid = dynamic_cast<const GridSource*>(&source))
     GridOrigin::requireMemory(*grid, options.scalars, plan);
@@ -294,6 +296,7 @@ AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& giv
   AddScalarReport report = room.during([&] { return Addition(source, options, plan, progress).run(); });
   report.threads = plan.threads;
   report.memory_bytes = plan.cap_bytes;
+  files.warn(report.warnings);
   return report;
 }
 

@@ -26,6 +26,7 @@
 #include "stream/base/file.h"
 #include "stream/base/memory.h"
 #include "stream/base/name_list.h"
+#include "stream/base/watched_file.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_update.h"
 #include "stream/cache/faces_file.h"
@@ -381,6 +382,7 @@ AddStepReport addStep(const DataSource& source, const AddStepOptions& options, P
   checkWritable(options.cache, "; name a splat cache that you may change");
   RoomNeeded room{options.given_folders, "the step and its temporary files", kFullDiskHint};
   if (room.folders.empty()) room.folders = {options.cache, temporaryFolder(options)};
+  const WatchedFiles files(source.description().files);
   return room.during([&] {
     prepareSets(options.cache);
     const CacheLock lock(options.cache);
@@ -389,6 +391,7 @@ AddStepReport addStep(const DataSource& source, const AddStepOptions& options, P
     AddStepReport report = addition.run();
     report.files.insert(report.files.end(), of_sets.files.begin(), of_sets.files.end());
     report.warnings.insert(report.warnings.end(), of_sets.warnings.begin(), of_sets.warnings.end());
+    files.warn(report.warnings);
     return report;
   });
 }

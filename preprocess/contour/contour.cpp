@@ -30,6 +30,8 @@ class SlabContour {
           if (isCrossed(strides.at(i, j, k), strides)) addCell(loaded, block, strides, {i, j, k});
   }
 
+  const ContourRange& range() const { return range_; }
+
  private:
   enum Side : uint8_t { kBelow = 1, kAbove = 2, kNone = 4 };
 
@@ -39,6 +41,7 @@ class SlabContour {
     for (size_t n = 0; n < values.size(); ++n) {
       const bool counts = nodes.blank[n] == 0 && values[n] >= options_.lower && values[n] <= options_.upper;
       sides_[n] = !counts ? kNone : double{values[n]} >= options_.value ? kAbove : kBelow;
+      if (counts) range_.add(values[n]);
     }
   }
   bool isCrossed(size_t at, const WindowStrides& strides) const {
@@ -65,6 +68,7 @@ class SlabContour {
 
   const ContourOptions& options_;
   CellContour& contour_;
+  ContourRange range_;
   std::vector<uint8_t> sides_;  // [node of the window]
   std::array<uint64_t, 8> points_{};
   std::array<glm::dvec3, 8> at_{};
@@ -73,8 +77,8 @@ class SlabContour {
 
 }  // namespace
 
-void contourGrid(const GridSource& source, const ContourOptions& options, TriangleSink& sink,
-                 Progress& progress) {
+ContourRange contourGrid(const GridSource& source, const ContourOptions& options, TriangleSink& sink,
+                         Progress& progress) {
   const std::vector<GridBlock>& blocks = source.description().blocks;
   const NodeReader reader(source, {options.scalar}, std::nullopt);
   ContourMesh mesh(sink);
@@ -105,10 +109,11 @@ void contourGrid(const GridSource& source, const ContourOptions& options, Triang
   }
   mesh.finish();
   progress.end();
+  return slabs.range();
 }
 
-void contourMesh(const MeshSource& source, const ContourOptions& options, const ScratchFiles& scratch,
-                 TriangleSink& sink, Progress& progress) {
+ContourRange contourMesh(const MeshSource& source, const ContourOptions& options, const ScratchFiles& scratch,
+                         TriangleSink& sink, Progress& progress) {
   const MeshReader reader(source, {options.scalar}, std::nullopt);
   reader.prepare(options.memory_bytes, progress);
   const PointNumbers numbers(reader, options.memory_bytes, scratch, progress);
@@ -116,18 +121,23 @@ void contourMesh(const MeshSource& source, const ContourOptions& options, const 
   CellContour contour(options.value, mesh);
   CornerGather gather(reader, numbers, halfBesideChunks(options.memory_bytes, reader.largestChunk()), scratch,
                       progress);
+  ContourRange range;
   gather.forEach([&](const GatheredCells& cells) {
     for (size_t n = 0; n < cells.size(); ++n) {
       if (cells.shapes[n] == CellKind::kNone) continue;
       const CellView cell = cells.view(n, 1);
-      const bool counts = std::all_of(cell.values.begin(), cell.values.end(), [&](float value) {
-        return value >= options.lower && value <= options.upper;
-      });
-      if (counts)
+      bool all_count = true;
+      for (const float value : cell.values) {
+        const bool counts = value >= options.lower && value <= options.upper;
+        if (counts) range.add(value);
+        all_count = all_count && counts;
+      }
+      if (all_count)
         contour.add({cells.cornersOfCell(n), cell.corners, cell.values, facesOf(cell.shape, cell.faces)});
     }
   });
   mesh.finish();
+  return range;
 }
 
 }  // namespace curvisplat

@@ -4,7 +4,9 @@
 // has its own. The same triangles in the same order for any memory.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 
 #include "preprocess/contour/contour_mesh.h"
 #include "preprocess/grid/grid_source.h"
@@ -22,13 +24,23 @@ struct ContourOptions {
   uint64_t memory_bytes = 512 << 20;
 };
 
-/// Writes the surface into `sink`. Takes some 30 MiB, and the vertices that slabs share. Throws Error as reading does, Interrupted once
-/// `progress` is stopped.
-void contourGrid(const GridSource& source, const ContourOptions& options, TriangleSink& sink,
-                 Progress& progress);
+/// The least and the largest value of the corners that count; lower > upper if there are none.
+struct ContourRange {
+  double lower = std::numeric_limits<double>::infinity(), upper = -std::numeric_limits<double>::infinity();
+
+  void add(double value) {
+    lower = std::min(lower, value);
+    upper = std::max(upper, value);
+  }
+};
+
+/// Writes the surface into `sink`, and returns the values met. Takes some 30 MiB, and the vertices that slabs share. Throws Error as
+/// reading does, Interrupted once `progress` is stopped.
+ContourRange contourGrid(const GridSource& source, const ContourOptions& options, TriangleSink& sink,
+                         Progress& progress);
 
 /// Does the same for a mesh, within `memory_bytes` besides the vertices of the surface. Temporary files lie in `scratch`.
-void contourMesh(const MeshSource& source, const ContourOptions& options, const ScratchFiles& scratch,
-                 TriangleSink& sink, Progress& progress);
+ContourRange contourMesh(const MeshSource& source, const ContourOptions& options, const ScratchFiles& scratch,
+                         TriangleSink& sink, Progress& progress);
 
 }  // namespace curvisplat

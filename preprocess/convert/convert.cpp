@@ -25,6 +25,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
+#include "stream/base/watched_file.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/manifest.h"
 
@@ -183,12 +184,15 @@ uint64_t nodesOf(const GridDescription& description) {
 ConvertReport convert(const DataSource& source, const ConvertOptions& given_options, Progress& progress) {
   ConvertOptions options = given_options;
   if (!options.ranks) options.ranks = &oneRank();
-  return convertSets(
+  const WatchedFiles files(source.description().files);
+  ConvertReport report = convertSets(
       source, options,
       [&](const ConvertOptions& of_set, const decltype(FurtherParts::own_blanks)& own_blanks) {
         return convertScalars(source, of_set, progress, own_blanks);
       },
       progress);
+  files.warn(report.warnings);
+  return report;
 }
 
 uint64_t times(uint64_t count, double factor) {

@@ -42,9 +42,6 @@ struct DrawnScalars {
   DrawnScalars(size_t variable, const TransferFunction& function) : opacity{variable, function} {}
   DrawnScalars(DrawnScalar of_opacity, DrawnScalar of_colour)
       : opacity(std::move(of_opacity)), colour(std::move(of_colour)) {}
-
-  /// The cache's variable that slices show.
-  size_t shownVariable() const { return colour ? colour->variable : opacity.variable; }
 };
 
 enum class Classification { kPixel, kFlat };  // flat: one colour and extinction per splat, as in the paper

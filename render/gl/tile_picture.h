@@ -40,7 +40,6 @@ class TilePicture {
 
   /// Reads the windows, one after the other, and calls use() with them. Throws PainterFailure if the card was reset.
   void read(const std::function<void(std::span<const float>)>& use) const;
-  uint64_t windowBytes() const { return window_bytes_; }
   uint64_t cardBytes() const { return 2 * window_bytes_ + closed_.bytes(); }
 
  private:

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -51,13 +52,8 @@ std::string faultOf(std::string_view text, const Json::exception& error) {
 std::string shown(const Json& value) {
   if (value.is_object()) return "an object";
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
-  if (text.size() > kLongestShown) {
-    size_t end = kLongestShown;
-    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80)
-      --end;  // between two characters
-    text = text.substr(0, end) + "...";
-  }
-  return text;
+  if (text.size() <= kLongestShown) return text;
+  return std::string(firstBytes(text, kLongestShown)) + "...";
 }
 
 /// The place of `value`, such as "key_frames[2].time", if it is in `from`, whose place is `place`.

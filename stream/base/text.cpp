@@ -40,6 +40,13 @@ std::string lowerCase(std::string_view text) {
   return lowered;
 }
 
+std::string_view firstBytes(std::string_view text, size_t most) {
+  const auto isWithinCharacter = [&](size_t at) { return at < text.size() && (text[at] & 0xc0) == 0x80; };
+  size_t end = std::min(most, text.size());
+  while (end > 0 && isWithinCharacter(end)) --end;
+  return text.substr(0, end);
+}
+
 bool isSameIgnoringCase(std::string_view a, std::string_view b) {
   return std::ranges::equal(a, b, {}, lower, lower);
 }

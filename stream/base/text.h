@@ -25,6 +25,9 @@ std::vector<std::string_view> wordsOf(std::string_view text);
 /// `text` with small letters instead of capitals.
 std::string lowerCase(std::string_view text);
 
+/// The first `most` bytes of `text`, fewer where they would end within a character of UTF-8.
+std::string_view firstBytes(std::string_view text, size_t most);
+
 /// Whether the texts differ in capitals alone.
 bool isSameIgnoringCase(std::string_view a, std::string_view b);
 

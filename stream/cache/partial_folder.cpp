@@ -132,6 +132,17 @@ bool isOurs(const fs::path& path, const fs::path& target) {
   return text && kPartialMark.starts_with(*text);
 }
 
+/// Why this user may not remove a folder with what is in it: an error of errno, or 0.
+int whyUnremovable(const fs::path& folder) {
+  if (::faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0) return errno;
+  struct stat ours {
+  }, above{};
+  if (::stat(folder.c_str(), &ours) != 0 || ::stat(folderOf(folder).c_str(), &above) != 0) return errno;
+  const uid_t user = ::geteuid();
+  const bool is_owner = user == 0 || user == ours.st_uid || user == above.st_uid;
+  return (above.st_mode & S_ISVTX) != 0 && !is_owner ? EPERM : 0;  // as in /tmp
+}
+
 }  // namespace
 
 void checkReplaceable(const fs::path& target, bool overwrite) {
@@ -151,6 +162,9 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
         "({})",
         target.string(), error.what());
   }
+  if (const int error = whyUnremovable(target); error != 0)
+    throw OutputError("{}: cannot be overwritten: {}; choose another output", target.string(),
+                      std::strerror(error));
 }
 
 std::vector<fs::path> foreignNames(const fs::path& cache) {

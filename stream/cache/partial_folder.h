@@ -31,7 +31,7 @@ inline constexpr const char* kPartialSuffix = ".partial";  // of the folder's na
 inline constexpr const char* kPartialLock = "lock";
 inline constexpr std::string_view kPartialMark = "curvisplat: unfinished cache\n";
 
-/// Throws Error if `target` exists, unless it is a cache and `overwrite` is true.
+/// Throws Error if `target` exists, unless it is a cache that this user may remove and `overwrite` is true.
 void checkReplaceable(const std::filesystem::path& target, bool overwrite);
 
 /// Whether it is a file that has one of the names which the program gives to files of caches.

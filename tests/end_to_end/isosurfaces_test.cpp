@@ -172,7 +172,9 @@ TEST_F(Isosurfaces, MeshesOfTheGridsOwnCellsLieOnThemToo) {
   const std::string grid = file("own.xyz"), cache = file("own.splats");
   run({"generate", "half-annulus", "--size", "97x49x49", "-o", file("own")});
   run({"convert", grid, file("own.fun"), "-o", cache});
-  const std::string said = run({"export", cache, "-o", file("own.ply"), "--iso", "0.5", "--source"}).out;
+  const ProgramResult exported = run({"export", cache, "-o", file("own.ply"), "--iso", "0.5", "--source"});
+  EXPECT_EQ(exported.err, "");
+  const std::string& said = exported.out;
   expectSays(said, "own.ply: isosurface of f at 0.5: ");
   expectSays(said, "of the cells of " + grid);
   const InputFile first(file("own.ply"));
@@ -189,6 +191,11 @@ TEST_F(Isosurfaces, MeshesOfTheGridsOwnCellsLieOnThemToo) {
   std::vector<std::byte> more(again.size());
   again.readAt(0, std::span(more));
   EXPECT_EQ(more, bytes);
+  run({"generate", "wake", "--size", "97x49x49", "-o", file("other")});
+  const ProgramResult other =
+      run({"export", cache, "-o", file("other.ply"), "--iso", "0.5", "--source", grid, file("other.fun")});
+  expectSays(other.err, "warning: f is from 0.14");
+  expectSays(other.err, "they may be of another time step");
   const struct {
     Words options;
     int status;

@@ -84,6 +84,20 @@ class Messages(FormatCase):
             result = self.run_program("render", grid, "--scalar", scalar, *picture)
             self.assertEqual((result.returncode, scalar in result.stdout), (0, True), result.stderr)
 
+    def test_layouts_of_plot3d_are_refused_for_other_formats(self):
+        grid = self.vti("a.vti", "p")
+        for option in (("--ascii",), ("--records", "4"), ("--iblank", "no")):
+            result = self.run_program("info", grid, *option)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("tell the layout of PLOT3D files; leave them out", result.stderr)
+
+    def test_options_of_globes_are_refused_for_other_grids(self):
+        grid = self.vti("a.vti", "p")
+        for option in (("--vertical-scale", "3"), ("--flat",), ("--sphere=6000",)):
+            result = self.run_program("convert", grid, *option, "-o", self.folder / "a.splats")
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("has no longitudes and latitudes; leave out", result.stderr)
+
     def test_names_of_hdf5_files_that_are_not_read(self):
         import h5py
         for group, words in (("ENS_MAA/mesh", "a MED file"), ("settings", "a Fluent case"), ("_silolibinfo", "a Silo file"), ("sim info", "of FLASH"), ("tstt", "a MOAB mesh")):

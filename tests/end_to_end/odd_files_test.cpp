@@ -108,6 +108,8 @@ TEST_F(OddFiles, InputsAreNotOverwritten) {
   expectRefused(
       {"render", cache(), "-o", file("a.png"), "--stats", file("b.png"), "--first-image", file("b.png")}, 1,
       {"would overwrite"});
+  expectRefused({"render", cache(), "-o", file("a.png"), "--first-image", file("./a.png")}, 1,
+                {"--first-image", "would overwrite"});
   std::ofstream(file("tf.json")) << "{}";
   expectRefused({"render", cache(), "-o", file("a.png"), "--tf", file("tf.json"), "--stats", file("tf.json")},
                 1, {"would overwrite"});

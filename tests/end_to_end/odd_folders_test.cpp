@@ -136,6 +136,16 @@ TEST_F(ReadOnlyTest, ItIsNotWrittenTo) {
   expectDenied({"generate", "wake", "--size", "4x4x4", "-o", ro / "w"}, ro);
 }
 
+TEST_F(ReadOnlyTest, AnothersCacheIsNotOverwritten) {
+  const fs::path cache = folder_ / "rw/c.splats";
+  fs::copy(cache_, cache, fs::copy_options::recursive);
+  fs::permissions(cache, fs::perms::owner_write, fs::perm_options::remove);
+  const ProgramResult result = runProgramBound(cubeArguments(readOnly() / "cube", {"--overwrite"}, cache));
+  fs::permissions(cache, fs::perms::owner_write, fs::perm_options::add);
+  expectRefused(result, 1, {"c.splats: cannot be overwritten: Permission denied"});
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "rw"), {}), 1);  // no c.splats.partial
+}
+
 TEST_F(ReadOnlyTest, WhatCannotBeReadIsNamed) {
   const fs::path rw = folder_ / "rw";
   fs::permissions(readOnly() / "cube.xyz", fs::perms::none);

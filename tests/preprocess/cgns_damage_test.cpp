@@ -10,6 +10,7 @@
 #include "tests/support/earth_files.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/fault_sweep.h"
+#include "tests/support/grid_nodes.h"
 #include "tests/support/hdf5_editor.h"
 #include "tests/support/temporary_folder.h"
 
@@ -53,6 +54,13 @@ TEST_P(CgnsDamage, TruncatedFilesAreRefusedOrRead) {
   const DamageReport report = openTruncated(path_, count, open);
   EXPECT_EQ(harm("truncated", report), "");
   EXPECT_GT(report.refused, count / 2);
+}
+
+TEST_P(CgnsDamage, FilesThatAreCutWhileTheyAreOpenAreRefused) {
+  const std::unique_ptr<GridSource> grid = open(path_);
+  EXPECT_GT(allNodes(*grid, 0).x.size(), 0u);
+  std::filesystem::resize_file(path_, 700);
+  EXPECT_NE(errorOf([&] { allNodes(*grid, 0); }).find(path_.string()), std::string::npos);
 }
 
 TEST_P(CgnsDamage, TruncatedFilesAreNamedBeforeALibrarySeesThem) {

@@ -56,6 +56,29 @@ TEST_P(NetcdfDamage, FilesWithAWrongByteAreRefusedOrRead) {
   EXPECT_GT(report.refused, count / 20);
 }
 
+// The libraries read zeros beyond the end.
+TEST_P(NetcdfDamage, FilesThatAreCutWhileTheyAreOpenAreRefused) {
+  const NetcdfFile file(path_);
+  const auto variable = std::ranges::find_if(
+      file.variables(), [](const NetcdfVariable& v) { return v.numeric && v.dims.size() > 2; });
+  ASSERT_NE(variable, file.variables().end());
+  NetcdfBox box;
+  for (size_t axis = 0; axis < variable->dims.size(); ++axis) {
+    box.start.push_back(0);
+    box.count.push_back(file.dimension(*variable, axis).length);
+  }
+  std::vector<double> values(box.values());
+  const auto read = [&] { file.read(*variable, box, std::span(values)); };
+  const std::string changed =
+      path_.string() + ": was changed while it was read; start again when it is complete";
+  const uint64_t bytes = std::filesystem::file_size(path_);
+  EXPECT_EQ(errorOf(read), "");
+  std::ofstream(path_, std::ios::app) << "more";
+  EXPECT_EQ(errorOf(read), "");  // of a program that still writes further steps
+  std::filesystem::resize_file(path_, bytes / 2);
+  EXPECT_EQ(errorOf(read), changed);
+}
+
 TEST(ClassicNetcdfDamage, NamesThatAreTooLongAreRefused) {
   // A header of NetCDF's first version: no records, and one dimension with a name of 300 bytes and a length
   // of 4.

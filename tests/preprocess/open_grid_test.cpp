@@ -325,6 +325,8 @@ TEST_F(ForeignFormats, FoldersAreNamed) {
   expectNamed("store.zarr", "an array of a Zarr store; give the store");
   std::filesystem::create_directory(folder_ / "folder");
   expectNamed("folder", "a directory; expected");
+  for (const char* file : {"manifest.json", "bricks.bin"}) std::ofstream(folder_ / "folder" / file) << "{}";
+  expectNamed("folder", "a splat cache, which takes no further files");
 }
 
 TEST_F(ForeignFormats, TextsOfNumbersAreStillTriedAsPlot3d) {

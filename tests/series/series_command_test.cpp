@@ -361,6 +361,37 @@ TEST_F(Follow, NoticesChanges) {
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
 }
 
+// A program may pause for longer than two seconds within a file.
+TEST_F(Follow, TriesTheLastFileAgainWhenItHasChanged) {
+  generate(3);
+  const std::string whole = bytesOfFile(file("w_0001.fun"));
+  fs::rename(file("w_0002.fun"), file("later"));
+  fs::resize_file(file("w_0001.fun"), whole.size() / 2);
+  const auto command = [&](const char* cache, const std::string& more) {
+    return fmt::format("exec '{}' convert '{}' '{}' --follow --until 2 -o '{}' {} 2>'{}'", CURVISPLAT_PROGRAM,
+                       file("w.xyz"), file("w_*.fun"), file(cache), more, file("said"));
+  };
+  std::ofstream(file("said"));
+  RunningProgram following({"-c", command("a.splats", "")}, "/bin/sh");
+  {
+    FolderWatch watch(folder_.path());
+    watch.waitUntil([&] { return bytesOfFile(file("said")).find("not taken yet: ") != std::string::npos; });
+  }
+  std::ofstream(file("w_0001.fun"), std::ios::binary) << whole;
+  EXPECT_EQ(following.wait().status, 0);
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
+  const std::string said = bytesOfFile(file("said"));
+  EXPECT_EQ(lineCount(said), 1) << said;
+  expectSays(said, "w_0001.fun");
+  // It is given up when the next one is written.
+  fs::resize_file(file("w_0001.fun"), whole.size() / 2);
+  fs::rename(file("later"), file("w_0002.fun"));
+  RunningProgram ending({"-c", command("b.splats", "--keep-going")}, "/bin/sh");
+  EXPECT_EQ(ending.wait().status, 0);
+  EXPECT_EQ(CacheReader(file("b.splats")).series().steps.size(), 2u);
+  expectSays(bytesOfFile(file("said")), "left out ");
+}
+
 TEST_F(Follow, TakesFilesOfAnotherClock) {
   generate(2);
   settle(-std::chrono::hours(100));

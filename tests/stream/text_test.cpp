@@ -51,6 +51,15 @@ TEST(Words, HaveSmallLettersOfAsciiAlone) {
   EXPECT_TRUE(isSameIgnoringCase("", ""));
 }
 
+TEST(Words, AreCutBetweenCharacters) {
+  EXPECT_EQ(firstBytes("abc", 3), "abc");
+  EXPECT_EQ(firstBytes("abc", 2), "ab");
+  EXPECT_EQ(firstBytes("a\xc3\xa4z", 2), "a");  // an a with two dots has two bytes
+  EXPECT_EQ(firstBytes("a\xc3\xa4z", 3), "a\xc3\xa4");
+  EXPECT_EQ(firstBytes("\xe2\x82\xac", 2), "");  // the sign of the euro has three
+  EXPECT_EQ(firstBytes("", 5), "");
+}
+
 TEST(Words, OfAShellHaveQuotesWhereTheyNeedThem) {
   EXPECT_EQ(shellWord("a_b-c./,:=+@%1"), "a_b-c./,:=+@%1");
   EXPECT_EQ(shellWord("Temperature [K]"), "'Temperature [K]'");

@@ -168,7 +168,7 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   checkOutput(options.convert.output, options.convert.overwrite || options.convert.resume,
               temporaryFolderOf(options.convert));
   requireThreads(options.convert.threads);
-  const std::unique_ptr<DataSource> first = input.open(0);
+  std::unique_ptr<DataSource> first = input.open(0);
   ConvertOptions with_scalars = options.convert;
   with_scalars.scalars = input.scalars(first->description());
   if (const auto* const mesh = dynamic_cast<const MeshSource*>(first.get()))
@@ -185,7 +185,8 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   sample.count = std::min<uint64_t>(2, input.count);
   sample.scalars = [&](const GridDescription&) { return with_scalars.scalars; };
   sample.open = [&](uint64_t step) {
-    std::unique_ptr<GridSource> grid = requireGrid(input.open(step), "cannot follow a structured step");
+    std::unique_ptr<DataSource> opened = step == 0 && first ? std::move(first) : input.open(step);
+    std::unique_ptr<GridSource> grid = requireGrid(std::move(opened), "cannot follow a structured step");
     whole = grid->description();
     grid = sampleOf(std::move(grid), kSampledNodes);
     part = grid->description();

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "preprocess/addition/convert_series.h"
@@ -148,6 +149,7 @@ void follow(const ConvertArguments& arguments) {
   StepLog log(arguments, progress);
   FolderEvents events(foldersOf(arguments.grid));
   WrittenFiles files(arguments.grid);
+  std::set<std::string> converted;  // names of steps: a file may have several, and be tried again
   uint64_t steps = 0;
   const std::filesystem::path manifest = options.convert.output / "manifest.json";
   if (options.add || (options.convert.resume && std::filesystem::exists(manifest))) {
@@ -162,19 +164,35 @@ void follow(const ConvertArguments& arguments) {
       events.wait(files.untilNext(), progress);
       continue;
     }
-    for (const StepFiles& one : stepsIn(*step)) {
-      if (arguments.until && steps >= *arguments.until) break;
-      progress.throwIfStopped();
-      if (!options.add) options.convert.title = titleOf(one.options);
-      const std::vector<StepFiles> only{one};
-      const SeriesReport report = convertSeries(seriesInput(arguments, only, only), options, progress,
-                                                [&](const SeriesEvent& event) { log.add(event); });
-      log.sayNote();
-      if (report.converted > 0) printLine("step {}: {}", report.steps - 1, one.name);
-      std::fflush(stdout);
-      steps = report.steps;
-      options.add = true;
-      options.convert.overwrite = false;
+    // What fails may not be written yet. But of the first step, options may be wrong.
+    const bool may_grow = options.add && files.isLast();
+    options.keep_going = arguments.keep_going && !may_grow;
+    try {
+      for (const StepFiles& one : stepsIn(*step)) {
+        if (arguments.until && steps >= *arguments.until) break;
+        if (converted.contains(one.name)) continue;
+        progress.throwIfStopped();
+        if (!options.add) options.convert.title = titleOf(one.options);
+        const std::vector<StepFiles> only{one};
+        const SeriesReport report = convertSeries(seriesInput(arguments, only, only), options, progress,
+                                                  [&](const SeriesEvent& event) { log.add(event); });
+        log.sayNote();
+        if (report.converted > 0) printLine("step {}: {}", report.steps - 1, one.name);
+        std::fflush(stdout);
+        converted.insert(one.name);
+        steps = report.steps;
+        options.add = true;
+        options.convert.overwrite = false;
+      }
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const OutputError&) {
+      throw;
+    } catch (const Error& error) {
+      if (!may_grow) throw;
+      progress.end();
+      printMessage("warning: not taken yet: {}; it is tried again when the file has changed", error.what());
+      files.tryAgain(*step);
     }
   }
   printLine("{}: {}", options.convert.output.string(), countText(steps, "step"));

@@ -121,6 +121,16 @@ class ContourFile : public TriangleSink {
   IsoMeshFile* file_;
 };
 
+/// Warns if the files' values do not reach both ends of the cache's.
+void warnOfOtherValues(const ContourOptions& expected, const ContourRange& found, const std::string& scalar) {
+  const double rounding = 1e-6 * (expected.upper - expected.lower);
+  if (found.lower <= expected.lower + rounding && found.upper >= expected.upper - rounding) return;
+  printMessage(
+      "warning: {} is from {:g} to {:g} in the cache, and of these values the files of --source have those "
+      "from {:g} to {:g}; they may be of another time step",
+      scalar, expected.lower, expected.upper, found.lower, found.upper);
+}
+
 /// Exports the isosurface of the grid's own cells.
 void exportContour(const ExportArguments& arguments, const CacheReader& cache, size_t variable) {
   const VariableInfo& info = cache.manifest().variables[variable];
@@ -139,14 +149,16 @@ void exportContour(const ExportArguments& arguments, const CacheReader& cache, s
   options.memory_bytes = parseMemory("--memory", arguments.memory);
   IsoMeshFile file(arguments.output);
   ContourFile sink(file);
-  if (const auto* mesh = dynamic_cast<const MeshSource*>(source.grid.get()))
-    contourMesh(*mesh, options, ScratchFiles(writableTarget(arguments.output).parent_path()), sink, progress);
-  else
-    contourGrid(dynamic_cast<const GridSource&>(*source.grid), options, sink, progress);
+  const auto* const mesh = dynamic_cast<const MeshSource*>(source.grid.get());
+  const ContourRange found =
+      mesh ? contourMesh(*mesh, options, ScratchFiles(writableTarget(arguments.output).parent_path()), sink,
+                         progress)
+           : contourGrid(dynamic_cast<const GridSource&>(*source.grid), options, sink, progress);
   if (file.triangles() == 0)
     throw Error("{}: no isosurface of {} at {:g}", arguments.grid.grid.grid.string(), info.name,
                 options.value);
   file.finish(info.name, options.value);
+  warnOfOtherValues(options, found, info.name);
   printLine("{}: isosurface of {} at {:g}: {} triangles, {} vertices, of the cells of {}, {:.1f} MiB",
             arguments.output.string(), info.name, options.value, file.triangles(), file.vertices(),
             arguments.grid.grid.grid.string(), mebibytesOf(arguments.output));

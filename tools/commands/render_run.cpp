@@ -107,11 +107,12 @@ void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
     check_other("--first-image", arguments.first_image);
     check_other("--stats", arguments.statistics);
   }
+  others.push_back(arguments.output);
   if (!arguments.first_image.empty()) {
     checkImageName(arguments.first_image);
     checkOutputFile("--first-image", arguments.first_image, others);
+    others.push_back(arguments.first_image);
   }
-  others.insert(others.end(), {arguments.output, arguments.first_image});
   if (!arguments.statistics.empty()) checkJsonOutput("--stats", arguments.statistics, others);
 }
 

@@ -43,6 +43,19 @@ milliseconds WrittenFiles::untilSettled(const StepFiles& step) {
   return longest;
 }
 
+void WrittenFiles::tryAgain(const StepFiles& step) {
+  done_.erase(step.name);
+  failed_ = {step.name, std::chrono::steady_clock::now()};
+}
+
+bool WrittenFiles::hasFailedAsItIs(const StepFiles& step) const {
+  if (!failed_ || failed_->step != step.name) return false;
+  return std::ranges::none_of(filesOf(step.options), [&](const fs::path& path) {
+    const auto seen = seen_.find(path);
+    return seen != seen_.end() && seen->second.since > failed_->at;
+  });
+}
+
 std::vector<fs::path> foldersOf(const OpenGridOptions& options) {
   std::vector<fs::path> folders;
   for (const fs::path& file : filesOf(options)) {
@@ -75,9 +88,12 @@ std::optional<StepFiles> WrittenFiles::next() {
   }
   std::erase_if(steps, [&](const StepFiles& step) { return done_.contains(step.name); });
   if (steps.empty()) return std::nullopt;
+  is_last_ = steps.size() == 1;
   until_next_ = untilSettled(steps.front());
   // Those behind it are watched from now on, and need not be waited for one by one.
-  for (size_t n = 1; n < std::min(kWatchedAhead, steps.size()); ++n) untilSettled(steps[n]);
+  milliseconds behind = kLongestWait;
+  for (size_t n = std::min(kWatchedAhead, steps.size()); --n > 0;) behind = untilSettled(steps[n]);
+  if (hasFailedAsItIs(steps.front())) until_next_ = behind;
   if (until_next_.count() > 0) return std::nullopt;
   done_.insert(steps.front().name);
   return steps.front();

@@ -33,6 +33,11 @@ class WrittenFiles {
 
   /// The next step, in order, whose files are all written; nullopt if there is none yet.
   std::optional<StepFiles> next();
+  /// Whether next() knew of no step behind the one that it returned.
+  bool isLast() const { return is_last_; }
+  /// The step that next() returned could not be read, and may be incomplete: a program can pause for longer than two seconds while it
+  /// writes. next() returns it again once its files have changed and settled, or the step behind it is written.
+  void tryAgain(const StepFiles& step);
   /// How long to wait at most after nullopt before looking again, unless a file changes.
   std::chrono::milliseconds untilNext() const { return until_next_; }
 
@@ -42,14 +47,22 @@ class WrittenFiles {
     uintmax_t bytes;
     std::chrono::steady_clock::time_point since;
   };
+  struct Failed {
+    std::string step;
+    std::chrono::steady_clock::time_point at;
+  };
   /// The time until no file of the step has changed for a while, as far as it was watched; 0 or less where
   /// that is so.
   std::chrono::milliseconds untilSettled(const StepFiles& step);
+  /// Whether the step has failed, and none of its files was seen to change since.
+  bool hasFailedAsItIs(const StepFiles& step) const;
 
   const OpenGridOptions& options_;
   std::map<std::filesystem::path, Seen> seen_;
   std::set<std::string> done_;   // names of steps
   bool begins_at_last_ = false;  // of those that are done
+  bool is_last_ = false;
+  std::optional<Failed> failed_;
   std::chrono::milliseconds until_next_{0};
 };
 

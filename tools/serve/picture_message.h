@@ -36,7 +36,6 @@ class LineQuality {
     return sent_.size() < kMaxOnTheWay && bytes_ <= most_bytes;
   }
   size_t onTheWay() const { return sent_.size(); }
-  uint64_t bytesOnTheWay() const { return bytes_; }
   int level() const { return level_; }
   PictureQuality quality() const;
 

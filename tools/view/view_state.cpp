@@ -16,6 +16,7 @@
 #include "render/project/screen_view.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
+#include "stream/base/text.h"
 #include "tools/view/stated_function.h"
 
 namespace curvisplat {
@@ -455,10 +456,7 @@ std::string signOf(const Marker& marker, const std::string& scalar) {
 }
 
 void ViewState::setTitle(std::string text) {
-  size_t length = std::min(text.size(), kLongestTitle);
-  const auto continuesLetter = [&](size_t at) { return at < text.size() && (text[at] & 0xc0) == 0x80; };
-  while (length > 0 && continuesLetter(length)) --length;
-  text.resize(length);
+  text.resize(firstBytes(text, kLongestTitle).size());
   title = std::move(text);
   annotations.texts = !title.empty();
 }

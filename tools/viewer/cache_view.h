@@ -178,7 +178,6 @@ class CacheView {
   void savePictureIfFinal();
   std::string timeOption(bool of_film) const;
   void copyCommand(MovieKind what);
-  void saveFunction(const std::filesystem::path& file);
   void saveView(const std::string& name);
   void loadView(const std::string& name);
   std::vector<std::string> otherScalars() const;

@@ -30,7 +30,7 @@ std::string placeOf(const std::string& node_path) {
 
 }  // namespace
 
-CgnsHdf5::CgnsHdf5(std::filesystem::path path) : path_(std::move(path)) {
+CgnsHdf5::CgnsHdf5(std::filesystem::path path) : path_(std::move(path)), watched_(path_) {
   tryHdf5(path_, [this] {
     size_t most = kTriedNodes;
     CgnsHdf5(path_).visitAll({}, 0, most);
@@ -283,6 +283,7 @@ void CgnsHdf5::readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, voi
                           count.data() + absent, nullptr) < 0 ||
       H5Dread(data.set.id(), type, memory.id(), data.space.id(), H5P_DEFAULT, to) < 0)
     unreadable(node.path, "its data");
+  watched_.requireWhole();
 }
 
 void CgnsHdf5::read(const CgnsNode& node, const CgnsBox& box, double* to) const {

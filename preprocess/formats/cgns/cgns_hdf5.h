@@ -28,6 +28,7 @@
 
 #include "preprocess/formats/cgns/cgns_node.h"
 #include "preprocess/formats/common/hdf5_objects.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 
@@ -73,6 +74,7 @@ class CgnsHdf5 {
   void readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, void* to) const;
 
   std::filesystem::path path_;
+  WatchedFile watched_;
   Hdf5File file_;
   // Guarded by dataLibraryMutex().
   mutable std::set<std::string> files_;  // those whose nodes were listed

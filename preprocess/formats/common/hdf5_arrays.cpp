@@ -82,7 +82,7 @@ void Hdf5Sets::with(const std::filesystem::path& path, const std::string& name,
 }
 
 Hdf5Array::Hdf5Array(std::shared_ptr<Hdf5Sets> sets, std::filesystem::path path, std::string name)
-    : sets_(std::move(sets)), path_(std::move(path)), name_(std::move(name)) {
+    : sets_(std::move(sets)), path_(std::move(path)), watched_(path_), name_(std::move(name)) {
   sets_->with(path_, name_, [&](hid_t set) {
     const Hdf5Type type(H5Dget_type(set));
     kind_ = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
@@ -159,6 +159,7 @@ void Hdf5Array::readParts(As as, const std::function<void(const ReadPart&)>& use
                           filter));
         fail("cannot be read (HDF5: " + reason + "); the file is damaged");
       }
+      watched_.requireWhole();
     });
   });
 }

@@ -17,6 +17,7 @@
 
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "stream/base/error.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 
@@ -90,6 +91,7 @@ class Hdf5Array {
 
   std::shared_ptr<Hdf5Sets> sets_;
   std::filesystem::path path_;
+  WatchedFile watched_;
   std::string name_;
   std::vector<uint64_t> dims_;
   uint64_t size_ = 1;

@@ -24,6 +24,8 @@ struct Plot3dForce {
   std::optional<int> precision_bytes;  // 4 or 8
   std::optional<bool> multi_block;
   std::optional<bool> blanking;
+
+  bool operator==(const Plot3dForce& other) const = default;
 };
 
 /// How longitude and latitude become positions.
@@ -32,6 +34,8 @@ struct GlobeOptions {
   Shape shape = Shape::kAutomatic;  // automatic: sphere for degrees, flat for lengths
   double radius_km = 6371;
   double vertical_scale = 1;
+
+  bool operator==(const GlobeOptions& other) const = default;
 };
 
 /// The options of openData(). Only `grid` has to be set.

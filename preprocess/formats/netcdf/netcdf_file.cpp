@@ -1,7 +1,6 @@
 #include "preprocess/formats/netcdf/netcdf_file.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -37,14 +36,6 @@ bool isClassic(std::string_view mark) {
   return mark.starts_with("CDF\x01") || mark.starts_with("CDF\x02") || mark.starts_with("CDF\x05");
 }
 
-/// Size, and time of the last change.
-std::pair<uint64_t, int64_t> stateOf(const std::filesystem::path& path) {
-  struct stat state {};
-  if (::stat(path.c_str(), &state) != 0) return {};
-  constexpr int64_t kNanoseconds = 1'000'000'000;
-  return {static_cast<uint64_t>(state.st_size), kNanoseconds * state.st_mtim.tv_sec + state.st_mtim.tv_nsec};
-}
-
 }  // namespace
 
 size_t NetcdfBox::values() const {
@@ -59,7 +50,7 @@ bool NetcdfFile::recognises(const InputFile& file) {
   return isClassic(mark) || mark == "\x89HDF\r\n\x1a\n";
 }
 
-NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
+NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path), watched_(path) {
   const InputFile file(path);
   const uint64_t bytes = file.size();
   std::array<char, 4> begin{};
@@ -71,7 +62,6 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
     tryHdf5(path, [&] { const NetcdfFile again(path); });
     plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
   }
-  opened_as_ = stateOf(path);
   const QuietHdf5 quiet;
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.
@@ -117,8 +107,7 @@ void NetcdfFile::emptyCaches() const {
 
 int NetcdfFile::opened() const {
   if (file_ >= 0) return file_;
-  if (stateOf(path_) != opened_as_)
-    throw Error("{}: was changed while it was read; start again when it is complete", path_.string());
+  if (!watched_.isSame()) watched_.failAsChanged();
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   if (const int status = nc_open(std::filesystem::absolute(path_).c_str(), NC_NOWRITE, &file_);
       status != NC_NOERR) {
@@ -277,6 +266,7 @@ void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const 
   const int status = get(opened(), variable.id, box.start.data(), box.count.data(), to.data());
   // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
   if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
+  watched_.requireWhole();
 }
 
 std::string NetcdfFile::readText(const NetcdfVariable& variable) const {

@@ -19,6 +19,7 @@
 
 #include "preprocess/formats/netcdf/netcdf_variable.h"
 #include "stream/base/file.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 
@@ -76,7 +77,7 @@ class NetcdfFile {
 
  protected:
   struct NotOpened {};
-  NetcdfFile(const std::filesystem::path& path, NotOpened) : path_(path) {}
+  NetcdfFile(const std::filesystem::path& path, NotOpened) : path_(path), watched_(path) {}
   void addVariable(NetcdfVariable variable);
 
   std::filesystem::path path_;
@@ -104,8 +105,8 @@ class NetcdfFile {
   void readWith(const Get& get, const NetcdfVariable& variable, const NetcdfBox& box,
                 std::span<Value> to) const;
 
-  mutable int file_ = -1;                   // -1: released
-  std::pair<uint64_t, int64_t> opened_as_;  // size, and time of the last change in nanoseconds
+  mutable int file_ = -1;  // -1: released
+  WatchedFile watched_;
   bool plain_hdf5_ = false;
   std::optional<uint64_t> records_;  // of a classic file
   std::vector<NetcdfVariable> variables_;

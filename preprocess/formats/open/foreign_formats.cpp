@@ -401,6 +401,9 @@ std::optional<std::string> foreignFolder(const std::filesystem::path& folder) {
   for (const char* mark : {"md.idx", "data.0"})
     if (std::filesystem::is_regular_file(folder / mark, error))
       return "an ADIOS2 file (.bp), which is not read (save it as VTK, with ParaView)";
+  if (std::filesystem::is_regular_file(folder / "manifest.json", error) &&
+      std::filesystem::is_regular_file(folder / "bricks.bin", error))
+    return "a splat cache, which takes no further files and is not converted again (draw it alone)";
   if (std::filesystem::is_regular_file(folder / "system" / "controlDict", error) && !isFoamCase(folder))
     return "an OpenFOAM case without a mesh: there is no constant/polyMesh (blockMesh, or what else the "
            "case's "

@@ -267,6 +267,18 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   if (complete.temporary_folder.empty()) complete.temporary_folder = systemTemporaryFolder();
   std::unique_ptr<DataSource> source =
       cutCurved(openInAnyOrder(complete), options.cut_curved.value_or(true), complete.temporary_folder);
+  if (options.globe != GlobeOptions{} && !source->description().globe)
+    throw UsageError(
+        "{}: has no longitudes and latitudes; leave out --sphere, --flat and --vertical-scale (that of "
+        "render "
+        "stretches pictures of any grid)",
+        complete.grid.string());
+  const std::string& format = source->description().format;
+  if (options.force != Plot3dForce{} && format.find("PLOT3D") == std::string::npos)
+    throw UsageError(
+        "{}: is {}; --ascii, --binary, --byte-order, --records, --precision, --blocks and --iblank tell the "
+        "layout of PLOT3D files; leave them out",
+        complete.grid.string(), format);
   chosenTimeStep(complete.grid.string(), source->description().times, options.time_step);
   return source;
 }
