@@ -217,6 +217,7 @@ class Addition {
 
   void mergeSeams() {
     passes_->mergeSeams();
+    if (!passes_->warningOfWalls().empty()) report_.warnings.push_back(passes_->warningOfWalls());
     report_.temporary_bytes = passes_->temporaryBytes();
   }
 

@@ -229,6 +229,7 @@ class StepAddition {
     checkRanges(survey, source_.description(), scalars_);
     StepWriter writer(lock_, cache, newStep());
     pass("seams", 0, "nodes", [&] { passes.mergeSeams(); });
+    if (!passes.warningOfWalls().empty()) report_.warnings.push_back(passes.warningOfWalls());
     pass("build", cache.manifest().splats, "splats", [&] {
       const StepReferences references(cache, options_.to_part);
       passes.build(writer, &references);

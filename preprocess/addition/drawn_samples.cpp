@@ -12,8 +12,12 @@
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/seams/seams.h"
+#include "stream/base/checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_index.h"
 #include "stream/cache/manifest.h"
+#include "stream/model/thin_walls.h"
 
 namespace curvisplat {
 namespace {
@@ -133,6 +137,23 @@ UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   return manifest.stretch == kDualCells ? UnlikeHalves::kApart : UnlikeHalves::kApartInCells;
 }
 
+ThinWalls thinWallsOf(const CacheReader& cache) {
+  const Manifest& manifest = cache.manifest();
+  if (!manifest.hasFeature(kThinWalls)) return {};
+  const InputFile file(cacheFile(cache.path(), kThinWallsFileName));
+  const auto info = std::ranges::find(manifest.files, kThinWallsFileName, &FileInfo::name);
+  constexpr uint64_t kLargest = uint64_t{64} << 20;
+  std::vector<WallSide> boxes(std::min(file.size(), kLargest) / sizeof(WallSide));
+  file.readAt(0, std::span(boxes));
+  const auto bytes = std::as_bytes(std::span(boxes));
+  if (info == manifest.files.end() || file.size() != bytes.size() || checksumOf(bytes) != info->checksum)
+    throw Error("{}: is damaged (found {} bytes with another checksum than the manifest's); convert again",
+                file.path().string(), file.size());
+  std::vector<GridBlock> blocks;
+  for (const BlockInfo& block : manifest.blocks) blocks.push_back({block.name, block.ni, block.nj, block.nk});
+  return ThinWalls(boxes, blocks);
+}
+
 CacheGrid::CacheGrid(const GridSource& source) : ForwardingGrid(source) {
   uint64_t node = 0;
   for (const GridBlock& block : source.description().blocks) {
@@ -144,6 +165,7 @@ CacheGrid::CacheGrid(const GridSource& source) : ForwardingGrid(source) {
 void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                            const std::filesystem::path& temporary_folder, Progress& progress) {
   rules_ = rulesOf(cache.manifest());
+  walls_ = thinWallsOf(cache);
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
 
@@ -151,6 +173,7 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
                                const std::filesystem::path& temporary_folder, Progress& progress) {
   all_faces_ = true;
   SeamMerger seams(0, plan.seam_bytes, temporary_folder, unlike);
+  seams.keepApart(walls_);
   NoSink none;
   SlabPass pass(progress);
   pass.rules = rules_;

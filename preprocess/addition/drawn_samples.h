@@ -18,6 +18,7 @@
 #include "preprocess/mesh/forwarding_mesh.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/seams/joint_nodes.h"
+#include "preprocess/seams/thin_walls.h"
 #include "preprocess/splats/node_splats.h"
 #include "stream/base/file.h"
 #include "stream/base/progress.h"
@@ -53,6 +54,9 @@ UnlikeHalves unlikeHalvesOf(const Manifest& manifest);
 /// The corrections that the cache's splats were made with.
 SplatRules rulesOf(const Manifest& manifest);
 
+/// The thin walls that the cache's splats end at. Throws Error if walls.bin is damaged.
+ThinWalls thinWallsOf(const CacheReader& cache);
+
 /// A structured grid of which nodes without a splat in the cache are blanked. With cell-centred scalars,
 /// cells without a splat in the cache have the value NaN.
 class CacheGrid : public ForwardingGrid {
@@ -78,6 +82,7 @@ class CacheGrid : public ForwardingGrid {
   std::vector<uint64_t> first_nodes_;  // [block]
   std::unique_ptr<DrawnNodes> drawn_;
   SplatRules rules_;        // of the cache
+  ThinWalls walls_;         // of the cache
   bool all_faces_ = false;  // while merged ones are looked for: nodes of block faces are not restricted
 };
 

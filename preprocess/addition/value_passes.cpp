@@ -10,7 +10,9 @@
 #include "preprocess/convert/sampled_scalars.h"
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/shared_passes.h"
+#include "preprocess/seams/wall_search.h"
 #include "stream/base/file.h"
+#include "stream/base/text.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/manifest.h"
 
@@ -66,7 +68,7 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
   openFile();
   seams_ = std::make_unique<SeamMerger>(variables_, plan_.seam_bytes, scratch_,
                                         unlikeHalvesOf(cache_->manifest()));
-  coordinate_bytes_ = reader.source().description().coordinate_bytes;
+  grid_ = &reader.source();
 
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
   std::optional<BlockOwners> owners;
@@ -84,8 +86,18 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
 void ValuePasses::mergeSeams() {
   if (seams_) seams_->sendToFirst(*ranks_);
   if (seams_ && ranks_->isFirst()) {
+    const ThinWalls walls = thinWallsOf(*cache_);
+    const std::vector<WallSide> of_values =
+        findThinWalls(*seams_, *grid_, {plan_.slab_bytes, scratch_}, *progress_);
+    if (const uint64_t missing = countMissing(of_values, grid_->description().blocks, walls); missing > 0)
+      warning_of_walls_ = fmt::format(
+          "at {} of nodes on both sides of thin walls the values are means of both sides: the cache has one "
+          "splat for each pair, since no values differed there when it was made; convert again, beginning "
+          "with a step in which they do",
+          countText(missing, "pair"));
+    seams_->keepApart(walls);
     tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
-    seams_->finishInParallel(coordinate_bytes_,
+    seams_->finishInParallel(grid_->description().coordinate_bytes,
                              [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
                                sinks.local().add(splat, values);
                                progress_->advance(1);

@@ -57,6 +57,9 @@ class ValuePasses {
   /// Scatters the values of an unstructured grid, after its survey(); rank 0 makes all its splats.
   void scatter(SplatOrigin& origin);
   void mergeSeams();
+  /// Empty, or a warning that at some thin walls the values are means of both sides: when the geometry was made the
+  /// values of both were the same there, or an earlier program has made it. Call it after mergeSeams().
+  const std::string& warningOfWalls() const { return warning_of_walls_; }
   /// `references`: what the values are predicted from; may be null. Throws Error if the splats are not those
   /// of the cache.
   void build(ValuesWriter& writer, const StepReferences* references = nullptr);
@@ -84,7 +87,8 @@ class ValuePasses {
   ValueSample sample_;
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<SeamMerger> seams_;
-  int coordinate_bytes_ = 0;
+  const GridSource* grid_ = nullptr;  // a structured one, whose values are scattered
+  std::string warning_of_walls_;
   uint64_t temporary_bytes_ = 0;
 };
 

@@ -20,16 +20,20 @@
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/convert/splat_record.h"
+#include "stream/base/checksum.h"
 #include "stream/base/disk_space.h"
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/memory.h"
 #include "stream/base/temporary_files.h"
+#include "stream/base/text.h"
 #include "stream/base/threads.h"
 #include "stream/base/trace.h"
 #include "stream/cache/cache_writer.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/partial_folder.h"
+#include "stream/model/thin_walls.h"
 
 namespace curvisplat {
 
@@ -236,6 +240,7 @@ class Conversion {
 
   void mergeSeams() {
     if (makesSplats()) splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
+    splats_.thin_walls = origin_->thinWalls();
     file_->close(!ranks_.alone());
     splats_.buckets = file_->chains();
     sample_->gatherFrom(ranks_);
@@ -356,6 +361,7 @@ class Conversion {
     Manifest manifest = manifestOf(*origin_, options_, splats_);
     for (const std::optional<FileInfo>& file : {faces_files_.faces, faces_files_.blanks})
       if (file) manifest.files.push_back(*file);
+    if (!splats_.thin_walls.empty()) manifest.files.push_back(writeThinWalls());
     manifest.own_blanks = own_blanks_;
     if (!own_blanks_.empty()) manifest.requirements.push_back(kOwnBlanks);
     reportCache(writer_->finish(manifest), report_);
@@ -365,8 +371,25 @@ class Conversion {
     report_.degenerate = splats_.counts.degenerate;
     report_.inverted = splats_.counts.inverted;
     report_.merged_nodes = splats_.merged_nodes;
+    if (!splats_.thin_walls.empty()) report_.notes.push_back(noteOfWalls());
     report_.temporary_bytes = std::max(splats_.temporaryBytes(), origin_->temporaryBytes());
     report_.resumed = workspace_->resumed();
+  }
+
+  FileInfo writeThinWalls() const {
+    const auto bytes = std::as_bytes(std::span(splats_.thin_walls));
+    writeFileDurably(partial_ / kThinWallsFileName, bytes);
+    return {kThinWallsFileName, bytes.size(), checksumOf(bytes)};
+  }
+
+  std::string noteOfWalls() const {
+    uint64_t nodes = 0;
+    for (const WallSide& box : splats_.thin_walls)
+      nodes += (box.last[0] - box.first[0] + 1) * (box.last[1] - box.first[1] + 1) *
+               (box.last[2] - box.first[2] + 1);
+    return fmt::format(
+        "{} of nodes on both sides of thin walls stay apart: they have other values at one place",
+        countText(nodes, "pair"));
   }
 
   /// Needs the survey.

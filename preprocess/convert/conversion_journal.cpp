@@ -224,6 +224,13 @@ ScatterState stateOf(const JsonField& from) {
   return state;
 }
 
+json jsonOf(const std::vector<WallSide>& walls) {
+  json boxes = json::array();
+  for (const auto& [block, side, first, last] : walls)
+    boxes.push_back({block, side, first[0], first[1], first[2], last[0], last[1], last[2]});
+  return boxes;
+}
+
 json jsonOf(const ScatteredSplats& splats) {
   json of_ranks = json::array();
   for (const BucketChains& buckets : splats.buckets_of_ranks) of_ranks.push_back(jsonOf(buckets));
@@ -235,6 +242,7 @@ json jsonOf(const ScatteredSplats& splats) {
                     {"hanging", splats.counts.hanging},
                     {"overlap", splats.overlap},
                     {"merged_nodes", splats.merged_nodes},
+                    {"thin_walls", jsonOf(splats.thin_walls)},
                     {"sample", splats.sample_file},
                     {"tree", jsonOf(splats.tree)},
                     {"buckets", jsonOf(splats.buckets)}};
@@ -250,6 +258,12 @@ ScatteredSplats splatsOf(const JsonField& from) {
     splats.counts.hanging = hanging->count();  // older programs fitted none
   splats.overlap = from.at("overlap").text();
   splats.merged_nodes = from.at("merged_nodes").count();
+  if (const auto walls = from.find("thin_walls"))  // older programs kept none apart
+    for (const JsonField& box : walls->elements())
+      splats.thin_walls.push_back({smallCount(box[0]),
+                                   smallCount(box[1]),
+                                   {box[2].count(), box[3].count(), box[4].count()},
+                                   {box[5].count(), box[6].count(), box[7].count()}});
   splats.sample_file = from.at("sample").text();
   splats.buckets = bucketsOf(from.at("buckets"));
   if (const auto ranks = from.find("buckets_of_ranks"))

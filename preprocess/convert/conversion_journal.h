@@ -33,7 +33,8 @@ struct ScatteredSplats {
   GridSurvey survey;
   ScatterCounts counts;
   uint64_t merged_nodes = 0;
-  std::string overlap;   // Manifest::overlap
+  std::string overlap;                    // Manifest::overlap
+  std::vector<WallSide> thin_walls = {};  // of walls.bin
   BucketTree tree;       // with contents, as it was scattered by: before any bucket was divided
   BucketChains buckets;  // of the temporary file
   std::vector<BucketChains> buckets_of_ranks = {};  // from rank 1 on, where several have scattered

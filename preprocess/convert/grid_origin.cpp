@@ -6,6 +6,8 @@
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/shared_passes.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/seams/thin_walls.h"
+#include "preprocess/seams/wall_search.h"
 #include "preprocess/splats/cell_splats.h"
 #include "preprocess/survey/block_overlap.h"
 #include "stream/base/error.h"
@@ -137,6 +139,9 @@ uint64_t GridOrigin::finish(const SinkOfThread& sink_of_thread, Progress& progre
     seams_.reset();
     return 0;
   }
+  // The slabs' memory is free by now.
+  walls_ = findThinWalls(*seams_, reader_.source(), {plan_.slab_bytes, scratch_}, progress);
+  seams_->keepApart(ThinWalls(walls_, blocks()));
   const uint64_t merged = seams_->finishInParallel(
       description().coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
         sink_of_thread().add(splat, values);

@@ -45,6 +45,7 @@ class GridOrigin final : public SplatOrigin {
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
                         Progress& progress) override;
   uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
+  std::vector<WallSide> thinWalls() const override { return walls_; }
   FacesFiles writeFaces(const FacesJob& job, Progress& progress) override {
     return writeGridFaces(reader_, job, smallSlabs(job.halo()), progress);
   }
@@ -66,6 +67,7 @@ class GridOrigin final : public SplatOrigin {
   std::unique_ptr<AbuttingFaces> faces_;  // of cells
   std::optional<PositionSample> sample_;  // from survey() to count(), if it is large enough to plan by
   std::unique_ptr<SeamMerger> seams_;     // of nodes
+  std::vector<WallSide> walls_;
 };
 
 }  // namespace curvisplat

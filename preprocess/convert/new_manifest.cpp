@@ -4,6 +4,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "stream/cache/manifest.h"
+#include "stream/model/thin_walls.h"
 
 namespace curvisplat {
 
@@ -46,6 +47,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   if (options.precision == ValuePrecision::kFine) manifest.requirements.push_back(kFineValues);
   if (options.precision == ValuePrecision::kAuto) manifest.requirements.push_back(kScaledValues);
   if (origin.cutsOctants() && survey.blanked.total() > 0) manifest.requirements.push_back(kCellOctants);
+  if (!splats.thin_walls.empty()) manifest.requirements.push_back(kThinWalls);
   manifest.overlap = splats.overlap;
   manifest.cells = origin.centring() == Centring::kCell;
   if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);

@@ -25,6 +25,7 @@
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
 #include "stream/model/octree.h"
+#include "stream/model/thin_walls.h"
 
 namespace curvisplat {
 
@@ -118,6 +119,8 @@ class SplatOrigin {
                                 Progress& progress) = 0;
   /// Returns how many samples became part of another one's splat.
   virtual uint64_t finish(const SinkOfThread&, Progress&) { return 0; }
+  /// The boxes of walls.bin, after finish().
+  virtual std::vector<WallSide> thinWalls() const { return {}; }
   /// Writes the surfaces of what the splats fill, if it has any. Call it at any time, after a resumed
   /// conversion too.
   virtual FacesFiles writeFaces(const FacesJob&, Progress&) { return {}; }

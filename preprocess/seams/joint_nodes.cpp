@@ -160,15 +160,17 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b, JointFrames 
   return unlike ? Neighbourhood::kUnlike : Neighbourhood::kLike;
 }
 
-/// The group of each part, numbered by its first part: parts on two sides of an unlike joint are in two. All
-/// zero if no joint is unlike.
-std::vector<size_t> groupsAtJoints(std::span<const NodeSplat> parts, JointFrames frames) {
+/// The group of each part, numbered by its first part: parts on two sides of an unlike joint, or of a thin wall, are in
+/// two. All zero if there is no such joint.
+std::vector<size_t> groupsAtJoints(std::span<const NodeSplat> parts, std::span<const uint32_t> wall_sides,
+                                   JointFrames frames) {
   std::vector<size_t> group(parts.size());
   std::iota(group.begin(), group.end(), size_t{0});
   bool any_unlike = false;
   for (size_t a = 0; a < parts.size(); ++a)
     for (size_t b = a + 1; b < parts.size(); ++b) {
-      const Neighbourhood lie = neighbourhood(parts[a], parts[b], frames);
+      Neighbourhood lie = neighbourhood(parts[a], parts[b], frames);
+      if (lie == Neighbourhood::kLike && wall_sides[a] != wall_sides[b]) lie = Neighbourhood::kUnlike;
       any_unlike |= lie == Neighbourhood::kUnlike;
       if (lie == Neighbourhood::kUnlike || lie == Neighbourhood::kDiagonal) continue;
       const size_t to = std::min(group[a], group[b]), from = std::max(group[a], group[b]);
@@ -266,13 +268,14 @@ SplatWithValues MergedParts::finish() const {
   return merged;
 }
 
-void JointNodes::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
+void JointNodes::add(const NodeSplat& splat, std::span<const SplatScalar> values, uint32_t wall_side) {
   if (splat.behind_face) {
     behind_.add(splat, values);
   } else if (all_merged_) {
     groups_.front().add(splat, values, {});
   } else {
     parts_.add(splat, values);
+    wall_sides_.push_back(wall_side);
     if (parts_.size() > kMaxParts) mergeAll();
   }
 }
@@ -320,7 +323,26 @@ void JointNodes::finish(const Sink& sink) {
   } else {
     finishSeveral(sink);
   }
+  clear();
+}
+
+bool JointNodes::joinsHalves() const {
+  const std::span<const NodeSplat> parts = parts_.splats();
+  for (size_t a = 0; a < parts.size(); ++a)
+    for (size_t b = a + 1; b < parts.size(); ++b)
+      if (neighbourhood(parts[a], parts[b], framesOf(unlike_)) == Neighbourhood::kLike) return true;
+  return false;
+}
+
+std::vector<uint64_t> JointNodes::nodes() const {
+  std::vector<uint64_t> nodes;
+  for (const NodeSplat& part : parts_.splats()) nodes.push_back(part.node);
+  return nodes;
+}
+
+void JointNodes::clear() {
   parts_.clear();
+  wall_sides_.clear();
   behind_.clear();
   faces_.clear();
   all_merged_ = false;
@@ -332,7 +354,7 @@ void JointNodes::finishSeveral(const Sink& sink) {
   for (const NodeSplat& part : parts_.splats()) parts.push_back(&part);
   std::vector<size_t> group(parts_.size(), 0);
   const JointFrames frames = framesOf(unlike_);
-  if (unlike_ != UnlikeHalves::kMerged) group = groupsAtJoints(parts_.splats(), frames);
+  if (unlike_ != UnlikeHalves::kMerged) group = groupsAtJoints(parts_.splats(), wall_sides_, frames);
   const std::vector<JointSide> sides = sidesOf(parts, group, frames);
   if (!all_merged_) mergeGroups(group, sides);
   for (size_t n = 0; n < group_count_; ++n) {

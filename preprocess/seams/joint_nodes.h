@@ -2,7 +2,7 @@
 // whole cell, which is stretched and skewed by the lengths of both blocks' cells there (joint_sides.h); so
 // are the splats of the nodes next to the face. Where one half is more than 2.5 times as thick as the other,
 // they stay apart, each cut at the face between them: one splat for both would reach too far on the thin side
-// and not far enough on the thick one.
+// and not far enough on the thick one. So do halves on two sides of a thin wall (wall_search.h).
 //
 //    block A      |  block B                          alike                     unlike
 //    o     o     o|o     o     o                  o--[  o  ]--o              o----[o|o]-o-o
@@ -185,14 +185,21 @@ class JointNodes {
       : variables_(variables), unlike_(unlike), parts_(variables), behind_(variables) {}
 
   /// A node at the point, or one of the layer behind a face there, which loses its border code if that face
-  /// is closed.
-  void add(const NodeSplat& splat, std::span<const SplatScalar> values);
+  /// is closed. `wall_side`: of the node; halves of nodes on two sides of a thin wall stay apart.
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values, uint32_t wall_side = 0);
 
   /// Gets a splat, and the nodes that it was merged from; a splat of the layer behind has no such nodes.
   using Sink =
       std::function<void(const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes)>;
   /// Gives the merged splats to `sink`, then forgets the nodes.
   void finish(const Sink& sink);
+
+  /// Whether two of the nodes are like halves, which finish() would make one splat.
+  bool joinsHalves() const;
+  /// The nodes at the point, without those of layers behind it; empty if there are many.
+  std::vector<uint64_t> nodes() const;
+  /// Forgets the nodes.
+  void clear();
 
  private:
   void mergeAll();
@@ -205,8 +212,9 @@ class JointNodes {
   size_t variables_;
   UnlikeHalves unlike_;
   SplatList parts_;
-  bool all_merged_ = false;          // in the first group, in place of parts_, if there are many
-  std::vector<MergedParts> groups_;  // the first group_count_ of them are in use
+  std::vector<uint32_t> wall_sides_;  // of the parts
+  bool all_merged_ = false;           // in the first group, in place of parts_, if there are many
+  std::vector<MergedParts> groups_;   // the first group_count_ of them are in use
   size_t group_count_ = 0;
   SplatList behind_;
   std::vector<NodeSplat> faces_;  // what the parts have become

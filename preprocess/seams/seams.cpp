@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -83,6 +84,8 @@ struct SeamMerger::State {
   size_t variables;
   SeamSorter sorter;
   WaitingSplats waiting;
+  ThinWalls walls;
+  std::optional<std::vector<SweepRange>> ranges;  // once the sorter has sorted
 
   State(size_t variable_count, uint64_t memory_bytes, const std::filesystem::path& folder, UnlikeHalves how)
       : unlike(how),
@@ -111,7 +114,7 @@ struct SeamMerger::State {
       if (!splat.on_block_face && !splat.behind_face) return waiting.add(splat, values);
       const size_t set = sweep.add(node.swept());
       if (set == sets.size()) sets.emplace_back(unlike, variables);
-      sets[set].add(splat, values);
+      sets[set].add(splat, values, walls.sideOf(splat.node));
     });
     sweep.finish();
   }
@@ -121,21 +124,43 @@ struct SeamMerger::State {
         coordinate_bytes, [&](const SeamSorter::Visit& visit) { sorter.drain(visit); }, sink);
   }
 
-  std::vector<SweepRange> sortedRanges(unsigned threads, int coordinate_bytes) {
+  const std::vector<SweepRange>& sortedRanges(int coordinate_bytes) {
+    if (ranges) return *ranges;
     const TraceScope trace("sort seams");
-    return sorter.sort(threads, coordinate_bytes);
+    const auto threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
+    return ranges.emplace(sorter.sort(threads, coordinate_bytes));
   }
 
   /// The same by several threads.
   void sweepRanges(int coordinate_bytes, const JointNodes::Sink& sink) {
-    const auto threads = static_cast<unsigned>(tbb::this_task_arena::max_concurrency());
-    const std::vector<SweepRange> ranges = sortedRanges(threads, coordinate_bytes);
-    parallelFor(size_t{0}, ranges.size(), [&](size_t n) {
+    const std::vector<SweepRange>& of_threads = sortedRanges(coordinate_bytes);
+    parallelFor(size_t{0}, of_threads.size(), [&](size_t n) {
       const TraceScope trace("merge seams");
       sweep(
-          coordinate_bytes, [&](const SeamSorter::Visit& visit) { sorter.visit(ranges[n], visit); }, sink);
+          coordinate_bytes, [&](const SeamSorter::Visit& visit) { sorter.visit(of_threads[n], visit); },
+          sink);
     });
     sorter.forget();
+  }
+
+  /// Visits the joints of a range.
+  void findJoints(const SweepRange& range, int coordinate_bytes,
+                  const std::function<void(std::span<const uint64_t>)>& visit) {
+    const TraceScope trace("find joints");
+    std::vector<JointNodes> sets;
+    CoincidenceSweep sweep(coordinate_bytes, [&](size_t set) {
+      if (sets[set].joinsHalves()) visit(sets[set].nodes());
+      sets[set].clear();
+    });
+    NodeSplat splat;
+    sorter.visit(range, [&](const SeamRecord& node) {
+      node.unpack(splat, {});
+      if (!splat.on_block_face && !splat.behind_face) return;
+      const size_t set = sweep.add(node.swept());
+      if (set == sets.size()) sets.emplace_back(unlike, 0);
+      sets[set].add(splat, {});
+    });
+    sweep.finish();
   }
 
   uint64_t finish(void (State::*sweep_with)(int, const JointNodes::Sink&), int coordinate_bytes,
@@ -213,6 +238,17 @@ void SeamMerger::sendToFirst(Ranks& ranks) {
       }
     }
   }
+}
+
+void SeamMerger::forEachJoint(int coordinate_bytes,
+                              const std::function<void(std::span<const uint64_t>)>& visit) {
+  const std::vector<SweepRange>& ranges = state_->sortedRanges(coordinate_bytes);
+  parallelFor(size_t{0}, ranges.size(),
+              [&](size_t n) { state_->findJoints(ranges[n], coordinate_bytes, visit); });
+}
+
+void SeamMerger::keepApart(ThinWalls walls) {
+  state_->walls = std::move(walls);
 }
 
 uint64_t SeamMerger::finish(int coordinate_bytes,

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "preprocess/seams/joint_nodes.h"
+#include "preprocess/seams/thin_walls.h"
 #include "preprocess/splats/node_splats.h"
 #include "stream/base/ranks.h"
 
@@ -47,6 +48,15 @@ class SeamMerger {
   /// Brings what the mergers of all ranks were given to rank 0's, a bounded amount at a time. All have to
   /// call it.
   void sendToFirst(Ranks& ranks);
+
+  /// Calls `visit` for each set of nodes of which halves would become one splat. Several threads call it at the same time,
+  /// in any order. Call it before finishInParallel(), at most once. Throws Error if the disk fails, and what `visit`
+  /// throws.
+  void forEachJoint(int coordinate_bytes, const std::function<void(std::span<const uint64_t>)>& visit);
+
+  /// Keeps nodes on different sides of thin walls apart, each with a splat that ends there. Call it before finish(),
+  /// finishInParallel() or forEachSet().
+  void keepApart(ThinWalls walls);
 
   /// Calls `sink` for each splat that is left: its node (and node_position) is the lowest of those merged,
   /// and regular is false. A node that has no other to merge with comes out as it went in. Returns how many

@@ -14,6 +14,7 @@
 #include "stream/cache/value_histogram.h"
 #include "stream/model/border_code.h"
 #include "stream/model/splats.h"
+#include "stream/model/thin_walls.h"
 #include "stream/vdb/brick_grids.h"
 
 namespace curvisplat {
@@ -44,6 +45,7 @@ class Verifier {
     verifyWeights();
     verifyHistograms();
     verifyGrids();
+    verifyThinWalls();
     verifyFaces();
     if (progress) progress->end();
     return std::move(result_);
@@ -266,6 +268,28 @@ class Verifier {
                         path.string(), not_compared));
     } catch (const Error& error) {
       find("{}", error.what());
+    }
+  }
+
+  void verifyThinWalls() {
+    for (const FileInfo& info : reader_.manifest().files) {
+      if (info.name != kThinWallsFileName) continue;
+      const std::filesystem::path path = reader_.path() / info.name;
+      try {
+        const InputFile file(cacheFile(reader_.path(), info.name));
+        Checksum checksum;
+        std::vector<std::byte> bytes(sizeof(WallSide) * 1024);
+        for (uint64_t at = 0; at < file.size(); at += bytes.size()) {
+          bytes.resize(std::min<uint64_t>(bytes.size(), file.size() - at));
+          file.readAt(at, std::span(bytes));
+          checksum.add(bytes);
+        }
+        if (checksum.value() != info.checksum)
+          find("{}: has a wrong checksum (found {:016x}, expected {:016x})", path.string(), checksum.value(),
+               info.checksum);
+      } catch (const Error& error) {
+        find("{}", error.what());
+      }
     }
   }
 

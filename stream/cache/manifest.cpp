@@ -13,6 +13,7 @@
 #include "stream/base/json_document.h"
 #include "stream/cache/cache_format.h"
 #include "stream/codec/values_codec.h"
+#include "stream/model/thin_walls.h"
 
 namespace curvisplat {
 namespace {
@@ -20,9 +21,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
-constexpr const char* kKnownFeatures[] = {kBorderFaces,  kCellGrowth,  kMergedBorders, kFaceLayers,
-                                          kPlates,       kBorderPairs, kSteps,         kFineValues,
-                                          kScaledValues, kCellOctants, kOwnBlanks,     kOwnBlanksOfSteps};
+constexpr const char* kKnownFeatures[] = {
+    kBorderFaces, kCellGrowth,   kMergedBorders, kFaceLayers, kPlates,           kBorderPairs, kSteps,
+    kFineValues,  kScaledValues, kCellOctants,   kOwnBlanks,  kOwnBlanksOfSteps, kThinWalls};
 constexpr const char* kFormat = "curvisplat splat cache";
 // 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;

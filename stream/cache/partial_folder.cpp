@@ -63,7 +63,7 @@ void requireRemoved(std::error_code error, const fs::path& path, const char* wha
 bool isCacheFile(const fs::directory_entry& entry) {
   if (fs::is_directory(entry.symlink_status())) return false;
   static const std::regex own(
-      R"((manifest\.json|bricks\.(bin|vdb|log)|(geometry|steps|faces(\.(blanks|(var|step)\d+))?|var(\.\d+){1,2})\.bin|lock|journal)(\.part)?)");
+      R"((manifest\.json|bricks\.(bin|vdb|log)|(geometry|steps|walls|faces(\.(blanks|(var|step)\d+))?|var(\.\d+){1,2})\.bin|lock|journal)(\.part)?)");
   return std::regex_match(entry.path().filename().string(), own);
 }
 

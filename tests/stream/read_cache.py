@@ -9,7 +9,7 @@ import numpy as np
 import zstandard
 from xxhash import xxh3_64_intdigest as checksum
 
-FEATURES = set("steps fine-values cell-growth merged-borders face-layers plates border-pairs border-faces cell-octants scaled-values own-blanks own-blanks-steps".split())
+FEATURES = set("steps fine-values cell-growth merged-borders face-layers plates border-pairs border-faces cell-octants scaled-values own-blanks own-blanks-steps thin-walls".split())
 SHAPE, VALUES = ["a0", "a1", "a2", "l10", "l20", "l21"], ["mean", "slope0", "slope1", "slope2", "variance"]
 
 
