@@ -242,7 +242,7 @@ TEST_P(PainterTest, ASplatShowsItsNearerSide) {
       }
 }
 
-// Opaque splats, of which the first one shows. Three have one key. Of the other two the farther one leans: where it is looked
+// Opaque splats, of which the first one shows. Three have one key. The farther one of the other two leans: where it is looked
 // at, its plane lies before the nearer one, but its first key does not.
 TEST_P(PainterTest, SplatsComeByKeysHeldAtTheirFirstAndThenInTheirOrder) {
   const ClassificationTable grey([](double f) { return TransferFunction::Value{{f, f, f}, 1}; }, 0, 1);

@@ -283,6 +283,43 @@ TEST(Projection, PencilsLeanAlongThemselves) {
   }
 }
 
+// A plane across the ray leaves the depths beyond it, distributed as a biweight (screen_splat.h): what is seen nearer than
+// their middle shrinks with their deviation and, since painters take the optical depth of the whole, with their share.
+TEST(Projection, WhatAPlaneLeavesHidesLessOfItself) {
+  Random random(13);
+  for (int n = 0; n < 200; ++n) {
+    const TestSplat splat = random.splat(0.05, 5, glm::dvec3(0));
+    ProjectionSettings settings{ScreenView::of(randomCamera(random, Projection::kOrthographic), kSize,
+                                               glm::dvec3(1), kMinLowPass, 1e-3)};
+    const ScreenView& view = settings.view;
+    const glm::dmat3 a = glm::transpose(glm::dmat3(view.right, view.down, view.forward)) *
+                         splat.splat.factor(),
+                     s = a * glm::transpose(a);
+    const glm::dvec2 across(s[2][0], s[2][1]);
+    const double deviation =
+        kKernelSigma *
+        std::sqrt(s[2][2] -
+                  glm::dot(across, glm::inverse(glm::dmat2(s[0][0], s[0][1], s[0][1], s[1][1])) * across));
+    const double at = random.in(-2, 2), side = n % 2 ? 1 : -1;  // deviations behind the middle; what is left
+    const double along = projectOne(splat, settings, {-0.3, -0.2, -0.4}).along;
+    settings.clip_planes = {{splat.splat.position + at * deviation * view.forward, side * view.forward}};
+    double share = 0, mean = 0, square = 0;
+    constexpr int kSteps = 20000;
+    const double reach = std::sqrt(7.0);
+    for (int step = 0; step < kSteps; ++step) {
+      const double x = reach * (2 * (step + 0.5) / kSteps - 1);
+      if (side * (x - at) < 0) continue;
+      const double part = 15 / (16 * reach) * std::pow(1 - x * x / 7, 2) * 2 * reach / kSteps;
+      share += part, mean += part * x, square += part * x * x;
+    }
+    mean /= share;
+    const double left = std::sqrt(square / share - mean * mean);
+    EXPECT_NEAR(projectOne(splat, settings, {-0.3, -0.2, -0.4}).along, along * share * left,
+                3e-3 * std::abs(along))
+        << n << ' ' << at << ' ' << side;
+  }
+}
+
 TEST(Projection, DepthOrdersAlongTheViewAndFromTheEye) {
   SplatGeometry geometry;
   SplatVariable variable;
