@@ -175,10 +175,13 @@ Cut cutOf(uint p, Ray ray, Ellipse e, mat3 a, Piece piece, bool clipped) {
   return cut;
 }
 
-float shareBelow(float x) {
-  return x * (0.9375 + x * x * (-0.625 + 0.1875 * x * x));
+vec3 integralsTo(float x) {
+  float x2 = x * x, rest = 1.0 - x2;
+  return vec3(x * (0.9375 + x2 * (-0.625 + 0.1875 * x2)), rest * rest * rest,
+              x * x2 * (0.3125 + x2 * (-0.375 + 0.13392857 * x2)));
 }
-float shareAtCentre(Cut cut) {
+// The share of the depths on the ray through the centre that is left, and its deviation. This is DepthsLeft::atCentre().
+vec2 leftAtCentre(Cut cut) {
   float lo = -1.0, hi = 1.0;
   for (int f = 0; f < 3; ++f) {
     float at = cut.faces[f].x / CUT_REACH;
@@ -187,7 +190,10 @@ float shareAtCentre(Cut cut) {
     else
       hi = min(hi, at);
   }
-  return max(0.0, shareBelow(min(hi, 1.0)) - shareBelow(min(lo, 1.0)));
+  vec3 left = integralsTo(min(hi, 1.0)) - integralsTo(min(lo, 1.0));
+  if (!(left.x > 1e-6)) return vec2(0.0);
+  float mean = -5.0 / 32.0 * left.y / left.x;
+  return vec2(left.x, sqrt(clamp(7.0 * (left.z / left.x - mean * mean), 0.0, 1.0)));
 }
 
 float steepest(Cut cut) {
@@ -290,6 +296,7 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
   Cut cut = cutOf(p, ray, e, a, piece, s.clipped);
   if (cut.nothing) return 0u;
   bool faces = cut.count > 0, across = side == kAcross;
+  vec2 left = faces ? leftAtCentre(cut) : vec2(1.0);
   float mean = piece.mean, correlation = faces ? correlationOf(ray, piece.w, e.half_width, steepest(cut)) : 0.0;
   Field depth = fieldOf(ray, across ? rowOf(at.depth_row, a) : vec3(0.0));
   float depth_steepness = across ? steepnessOfDepth(ray, depth) : 0.0;
@@ -302,8 +309,10 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
     e.slope0 = e.l11 * by_x + e.l21 * by_y;
     e.slope1 = e.l22 * by_y;
     e.half_width = cell.half_width;
-    e.along = cell.along * shareAtCentre(cut);
+    e.along = cell.along * left.x;
     correlation = 0.0;
+  } else {
+    e.along *= left.x * left.y;
   }
   e.amplitude *= s.opacity;
   uint own = slot + 4u * (room - 1u);
@@ -317,6 +326,7 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
       w = vec3(dot(w, inFrameOf(s.piece, a[0])), dot(w, inFrameOf(s.piece, a[1])), dot(w, inFrameOf(s.piece, a[2])));
     }
     Ellipse of_colour = ellipseOf(ray.b0, ray.b1, w, s.colour_variance, 1.0);
+    of_colour.along *= left.x * left.y;
     float with_depth = across ? correlationOf(ray, w, of_colour.half_width, depth_steepness)
                               : faces ? correlationOf(ray, w, of_colour.half_width, steepest(cut)) : 0.0;
     own -= 4u;

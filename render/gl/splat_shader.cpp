@@ -197,7 +197,7 @@ vec3 remainder(vec2 u, float lo, float hi) {
 }
 
 // How much nearer than its middle a splat of this optical depth is seen, in half widths of its depths; and which part of
-// their variance is not seen. As nearSide() and lostByHiding() in paint_cut-inl.h.
+// their variance is not seen. As nearSide() and lostByHiding() in paint_blocks-inl.h.
 vec2 nearSide(float tau) {
   if (tau < 0.02) return vec2(tau / 6.0, 0.0);
   float part = absorbed(tau) / tau;

@@ -191,6 +191,27 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
   return Remains::kSome;
 }
 
+DepthsLeft DepthsLeft::atCentre(const ScreenCut& cut) {
+  float lo = -1, hi = 1;
+  for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
+    const float at = cut.faces[n][0] / ScreenCut::kReach;
+    if (cut.far_sides >> n & 1)
+      lo = std::max(lo, -at);
+    else
+      hi = std::min(hi, at);
+  }
+  // The biweight's integrals from 0 to x, of 1, of -32/5 x, and of x squared.
+  const auto integralsTo = [](float x) {
+    const float x2 = x * x, rest = 1 - x2;
+    return glm::vec3(x * (0.9375f + x2 * (-0.625f + 0.1875f * x2)), rest * rest * rest,
+                     x * x2 * (0.3125f + x2 * (-0.375f + (0.9375f / 7) * x2)));
+  };
+  const glm::vec3 left = integralsTo(std::min(hi, 1.0f)) - integralsTo(std::min(lo, 1.0f));
+  if (!(left.x > 1e-6f)) return {0, 0};
+  const float mean = -5.0f / 32 * left.y / left.x, variance = left.z / left.x - mean * mean;
+  return {left.x, std::sqrt(std::clamp(7 * variance, 0.0f, 1.0f))};
+}
+
 ScreenDepth depthAlongRay(const ScreenRows& rows, const glm::vec3& depth_row, float depth,
                           const SplatPiece& piece, const Ellipse& ellipse, float low_pass_px2) {
   const RayFrame ray(rows, piece.shape, low_pass_px2);

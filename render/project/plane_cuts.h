@@ -89,6 +89,20 @@ enum class Remains { kNothing, kSome, kAll };
 Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellipse& ellipse,
                    float low_pass_px2, ScreenCut& cut);
 
+/// The part of the distribution of depths that the faces leave on the ray through the centre: its share, and its deviation.
+struct DepthsLeft {
+  float share, deviation;
+
+  static DepthsLeft atCentre(const ScreenCut& cut);
+};
+
+/// Returns `along` of a splat that is cut: what is left hides less of itself, by both its depths and its optical depth. Painters
+/// take the optical depth of all of it.
+inline float alongLeft(const Ellipse& ellipse, const ScreenCut& cut) {
+  const DepthsLeft left = DepthsLeft::atCentre(cut);
+  return ellipse.along * left.share * left.deviation;
+}
+
 /// `depth_row`: the depth per unit of the data. `depth`: of the piece's centre.
 ScreenDepth depthAlongRay(const ScreenRows& rows, const glm::vec3& depth_row, float depth,
                           const SplatPiece& piece, const Ellipse& ellipse, float low_pass_px2);

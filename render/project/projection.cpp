@@ -138,20 +138,6 @@ struct BrickArrays {
   const VariableArrays<const float>* colours;  // null: of pictures of one scalar
 };
 
-/// The part of the distribution of depths between the faces, on the ray through the centre.
-float shareAtCentre(const ScreenCut& cut) {
-  float lo = -1, hi = 1;
-  for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
-    const float at = cut.faces[n][0] / ScreenCut::kReach;
-    if (cut.far_sides >> n & 1)
-      lo = std::max(lo, -at);
-    else
-      hi = std::min(hi, at);
-  }
-  const auto below = [](float x) { return x * (0.9375f + x * x * (-0.625f + 0.1875f * x * x)); };
-  return std::max(0.0f, below(std::min(hi, 1.0f)) - below(std::min(lo, 1.0f)));
-}
-
 /// A cell at a border is drawn as a wider splat that is cut at the face, which gives it the right density; but its scalar
 /// stays that of the cell, which does not reach as far into those behind it. `cell`: its ellipse; `x`, `y`: its centre.
 void keepScalarOf(const Ellipse& cell, float mean, float x, float y, ScreenSplat& splat, ScreenCut& cut) {
@@ -161,7 +147,7 @@ void keepScalarOf(const Ellipse& cell, float mean, float x, float y, ScreenSplat
   splat.slope1 = splat.l22 * by_y;
   splat.half_width = cell.half_width;
   // Painters take the wide splat's optical depth for the cell's, which is this share of it.
-  splat.along = cell.along * shareAtCentre(cut);
+  splat.along = cell.along * DepthsLeft::atCentre(cut).share;
   cut.correlation = 0;
 }
 
@@ -242,6 +228,8 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
       const Ellipse cell = ellipseOf(at.rows, whole.shape, whole.slope, variable.variance[i],
                                      whole.weight * at.volume, map.low_pass);
       keepScalarOf(cell, whole.mean, x, y, splat, cut);
+    } else if (faces) {
+      splat.along = alongLeft(ellipse, cut);
     }
     ScreenDepth along_ray;
     if (across) {

@@ -219,14 +219,15 @@ ScreenColour colourOf(const Map& map, const PlacedPiece& at, const SplatPiece& p
   const Ellipse e =
       ellipseOf(at.rows, piece.shape, piece.slope, variance, piece.weight * at.volume, map.low_pass);
   ScreenColour colour{piece.mean, {e.slope0, e.slope1}, e.half_width, 0, e.along};
-  if (across) {
-    colour.correlation =
-        depthAlongRay(at.rows, at.depth_row, at.depth, piece, e, map.low_pass.footprint_px2).correlation;
-  } else if (faces) {
+  if (faces) {
     ScreenCut cut;
     cutAtFaces(at.rows, piece, e, map.low_pass.footprint_px2, cut);
     colour.correlation = cut.correlation;
+    colour.along = alongLeft(e, cut);
   }
+  if (across)
+    colour.correlation =
+        depthAlongRay(at.rows, at.depth_row, at.depth, piece, e, map.low_pass.footprint_px2).correlation;
   return colour;
 }
 

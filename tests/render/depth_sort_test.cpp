@@ -116,6 +116,8 @@ TEST_F(DepthKeysTest, StayInTheirBricksRangeWhateverTheDepth) {
         EXPECT_GE(key, range.first);
         EXPECT_LE(key, range.last);
       }
+      // What does not lean is painted as it comes: by its first key.
+      for (const ScreenSplat& splat : splats) EXPECT_TRUE(leans(splat) || splat.key == splat.first);
     }
 }
 
@@ -172,6 +174,80 @@ TEST_F(DepthKeysTest, ASplatThatLeansHasItsPlanesDepthInEveryTile) {
       }
     EXPECT_GT(tiles, 10);
   }
+}
+
+// Thin cells that are smaller than a pixel lean over whole tiles, much farther than they reach.
+TEST_F(DepthKeysTest, RangesHoldWhatSmallSplatsLean) {
+  Camera camera;
+  camera.position = {90, 20, 80};
+  camera.focal_point = {16, 16, 1};
+  camera.view_up = {0, 0, 1};
+  camera.projection = Projection::kOrthographic;
+  camera.parallel_scale = 1000;
+  const ProjectionSettings settings{ScreenView::of(camera, {120, 100}, {1, 1, 0.05}, 0.3, 0.001)};
+  const auto table = ClassificationTable::of(TransferFunction::preset("grey", 0, 1, 1.0), 0, 1);
+  const DepthKeys made(settings.view, cache_->manifest().root);
+  BrickProjector projector;
+  SplatGeometry geometry;
+  SplatVariable values;
+  uint64_t before = 0;  // of keys, those less than their centres'
+  for (uint32_t id = 0; id < cache_->bricks().size(); ++id) {
+    const Brick& brick = cache_->bricks()[id];
+    const glm::dvec3 corner = cache_->manifest().root.cellMin(brick.cell);
+    cache_->readGeometry(id, geometry);
+    cache_->readVariable(id, 0, values);
+    projector.project(settings, table, corner, geometry, values);
+    std::vector<uint32_t> held(projector.depths().size()), free(held.size());
+    std::vector<ScreenSplat> splats = projector.splats();
+    made.setKeys(splats, projector.depths(), corner, {0, ~uint32_t{0}}, free);
+    made.setKeys(projector.mutableSplats(), projector.depths(), corner, made.rangeOf(brick), held);
+    EXPECT_EQ(held, free) << id;
+    for (const ScreenSplat& splat : splats) before += leans(splat) && splat.first < splat.key;
+  }
+  EXPECT_GT(before, 1000u);
+}
+
+// The first key of a splat is the least that the tiles of its rectangle have, or that of a tile whose corner its ellipse
+// touches, whichever is more: both are at most the least of the tiles that it touches.
+TEST(TileKey, FirstIsTheLeastThatRectangleAndEllipseAllow) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
+  constexpr double kSupport = kKernelSupport, kHalf = 0.5 * kOrderSide;
+  int by_ellipse = 0, by_rectangle = 0, later = 0, single = 0;
+  for (int n = 0; n < 5000; ++n) {
+    ScreenSplat splat{};
+    splat.x = 100 * unit(random);
+    splat.y = 70 * unit(random);
+    splat.l11 = 0.2f + 6 * unit(random) * unit(random);
+    splat.l21 = 4 * around(random);
+    splat.l22 = 0.2f + 3 * unit(random);
+    if (n % 4 == 0) splat.l11 *= 0.1f, splat.l21 *= 0.1f, splat.l22 *= 0.1f;
+    const uint32_t key = splat.key = 1000000;
+    const double s0 = splat.key_slope0 = 300 * around(random), s1 = splat.key_slope1 = 300 * around(random);
+    const double reach_x = kSupport * splat.l11, reach_y = kSupport * std::hypot(splat.l21, splat.l22);
+    double least = INFINITY;
+    int tiles = 0;
+    const auto tileOf = [](double at) { return std::floor(at / kOrderSide); };
+    for (double row = tileOf(splat.y - reach_y); row <= tileOf(splat.y + reach_y); ++row)
+      for (double column = tileOf(splat.x - reach_x); column <= tileOf(splat.x + reach_x); ++column, ++tiles)
+        least = std::min(least, key + s0 * (column * kOrderSide + kHalf - splat.x) +
+                                    s1 * (row * kOrderSide + kHalf - splat.y));
+    const double of_ellipse = key - kSupport * std::hypot(s0 * splat.l11 + s1 * splat.l21, s1 * splat.l22) -
+                              kHalf * (std::abs(s0) + std::abs(s1));
+    setFirst(splat);
+    EXPECT_NEAR(splat.first, std::max(least, of_ellipse), 3) << n;
+    by_ellipse += of_ellipse > least + 100;
+    by_rectangle += least > of_ellipse + 100;
+    later += least > key + 10;
+    EXPECT_EQ(leans(splat), tiles > 1) << n;
+    if (tiles > 1) continue;
+    EXPECT_EQ(splat.key, splat.first) << n;
+    ++single;
+  }
+  EXPECT_GT(by_ellipse, 100);
+  EXPECT_GT(by_rectangle, 100);
+  EXPECT_GT(later, 100);
+  EXPECT_GT(single, 100);
 }
 
 // Splats that are cut into pieces still have depths of their own.

@@ -242,6 +242,26 @@ TEST_P(PainterTest, ASplatShowsItsNearerSide) {
       }
 }
 
+// Opaque splats, of which the first one shows. Three have one key. The farther one of the other two leans: where it is looked
+// at, its plane lies before the nearer one, but its first key does not.
+TEST_P(PainterTest, SplatsComeByKeysHeldAtTheirFirstAndThenInTheirOrder) {
+  const ClassificationTable grey([](double f) { return TransferFunction::Value{{f, f, f}, 1}; }, 0, 1);
+  const auto splat = [](float x, float mean, uint32_t key, float slope, uint32_t first) {
+    return ScreenSplat{x, 8, 6, 0, 6, 200, mean, 0, 0, 0, 0, 0, key, first, slope, 0};
+  };
+  const std::vector<ScreenSplat> splats{splat(8, 0.2f, 1000, 0, 1000), splat(8, 0.5f, 1000, 0, 1000),
+                                        splat(8, 0.8f, 1000, 0, 1000), splat(36, 0.3f, 28000, 0, 28000),
+                                        splat(32, 0.9f, 30000, -1000, 29000)};
+  Image image;
+  backend_->run([&](Painter& painter) {
+    painter.begin({48, 16}, kWhite, grey, {});
+    painter.draw(splats);
+    image = painter.end();
+  });
+  EXPECT_NEAR(image.pixel(8, 8)[0], 0.2f, 0.01f);
+  EXPECT_NEAR(image.pixel(38, 8)[0], 0.3f, 0.01f);
+}
+
 TEST_P(PainterTest, AFaceAcrossTheRayLeavesItsShare) {
   // Half of a splat that is seen through a face at its middle; with a scalar that falls along the ray, what
   // is left has the mean of the nearer half.

@@ -264,6 +264,28 @@ TEST(TileQueues, DivideNoTileWhereMemoryIsShort) {
   EXPECT_FALSE(divide(of_one_thread, 0));
 }
 
+TEST(TileQueues, DivideNoTileOnceMemoryWasShort) {
+  auto splats = leaningSplats(1500, 4);
+  std::vector<uint32_t> entries;
+  for (uint32_t n = 0; n < splats.size(); ++n) {
+    if (isRecord(splats[n])) continue;
+    splats[n].x *= 0.3f;  // into the first tile
+    splats[n].y *= 0.4f;
+    entries.push_back(n);
+  }
+  TileQueues queues(kSize, size_t{1} << 18, 2);
+  EXPECT_TRUE(divide(queues, 3));
+  queues.clear();
+  // All lies behind a front of 0, and waits.
+  for (int times = 0; times < 1000 && !queues.isFull(); ++times)
+    queues.paint(0, {splats, entries, 0}, TileQueues::kAllOpen,
+                 [](const OrderedTile&) { return TileQueues::kAllOpen; });
+  ASSERT_TRUE(queues.isFull());
+  queues.clear();
+  EXPECT_FALSE(queues.isFull());
+  EXPECT_FALSE(divide(queues, 3));
+}
+
 TEST(TileLists, LeaveOutOrderTilesOfWhichAFaceTakesAllPixels) {
   std::mt19937 random(11);
   const TileCorner corner{32, 64};
@@ -278,6 +300,11 @@ TEST(TileLists, LeaveOutOrderTilesOfWhichAFaceTakesAllPixels) {
     EXPECT_EQ(found & ~touched, 0u);
     for (int tile = 0; tile < static_cast<int>(kOrderTiles); ++tile) {
       if ((touched >> tile & 1) == 0) continue;
+      double nearest = INFINITY;  // of the pixels, squared, in the ellipse's measure
+      forPixels(splat, corner.x + static_cast<float>(tile % kOrderTilesAlong * kOrderSide),
+                corner.y + static_cast<float>(tile / kOrderTilesAlong * kOrderSide),
+                [&](double u0, double u1) { nearest = std::min(nearest, u0 * u0 + u1 * u1); });
+      EXPECT_LT(std::sqrt(nearest), kKernelSupport + 0.03 / std::min(splat.l11, splat.l22));
       bool left = false;
       std::array<bool, ScreenCut::kFaces> takes_all;
       takes_all.fill(true);
