@@ -45,15 +45,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kMaxTitle = 60;
-constexpr std::string_view kLacksValues = "have no value of";  // of an error of preprocess/addition
-
-/// The command that makes a cache of all scalars and one that is computed.
-std::string conversionWith(const std::string& scalar, const std::vector<fs::path>& files) {
-  std::string command = "curvisplat convert";
-  for (const fs::path& file : files) command += " " + shellWord(shortPath(file).string());
-  const std::string cache = fmt::format("{}_{}.splats", files.front().stem().string(), scalar);
-  return command + " -o " + shellWord(cache) + " --scalar " + shellWord("all," + scalar);
-}
 
 }  // namespace
 
@@ -228,15 +219,7 @@ void OpenedView::takeWhole() {
     show(*preparation->prepared, options, opening_files_);
   } catch (const Interrupted&) {
   } catch (const Error& error) {
-    const std::string text = error.what();
-    if (!adds_to_ || !view_ || text.find(kLacksValues) == text.npos)
-      return surroundings_.reports.report(error, About::kOpening);
-    surroundings_.reports.report(
-        fmt::format(
-            "{0} cannot be added: not all samples have it. A terminal makes a cache with it, to be opened "
-            "here: {1}",
-            adds_to_->name, conversionWith(adds_to_->name, view_->sources())),
-        About::kOpening);
+    surroundings_.reports.report(error, About::kOpening);
   } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
     surroundings_.reports.report(error, About::kOpening);
   }
