@@ -133,7 +133,7 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
 void Panels::drawTime(PanelActions& actions, Playback& playback) {
   label("steps per second");
   float speed = static_cast<float>(playback.stepsPerSecond());
-  if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f", ImGuiSliderFlags_AlwaysClamp))
+  if (slider("##steps per second", speed, 1, 60, "%.0f", ImGuiSliderFlags_AlwaysClamp))
     playback.setStepsPerSecond(speed);
   nameWidget("steps per second");
   bool loops = playback.loops();
@@ -284,8 +284,8 @@ namespace {
 void drawLight(ViewState& state, PanelActions& actions) {
   const auto slide = [&](const char* name, double& value, double low, double high, const char* format) {
     label(name);
-    const bool slides = ImGui::SliderScalar(fmt::format("##{}", name).c_str(), ImGuiDataType_Double, &value,
-                                            &low, &high, format, ImGuiSliderFlags_AlwaysClamp);
+    const bool slides =
+        slider(fmt::format("##{}", name).c_str(), value, low, high, format, ImGuiSliderFlags_AlwaysClamp);
     actions.dragging |= isDragged();
     actions.changed |= slides;
     nameWidget(name);
@@ -353,7 +353,7 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
   const auto darkness = [&](const char* name, const char* id, double& value, const char* help) {
     auto shown = static_cast<float>(value);
     label(name);
-    if (ImGui::SliderFloat(id, &shown, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+    if (slider(id, shown, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
       value = static_cast<double>(shown);
       actions.changed = true;
     }
@@ -372,8 +372,8 @@ void drawVerticalScale(ViewState& state, const std::optional<Globe>& globe, Pane
   if (globe && globe->sphere()) return;
   auto factor = static_cast<float>(state.verticalScale(globe));
   label("vertical scale");
-  if (ImGui::SliderFloat("##vertical scale", &factor, 0.01f, 1000, "%.3g",
-                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##vertical scale", factor, 0.01f, 1000, "%.3g",
+             ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
     state.setVerticalScale(static_cast<double>(factor), globe);
     actions.changed = true;
   }
@@ -407,7 +407,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   float angle = static_cast<float>(state.camera.view_angle_deg);
   label("view angle");
   ImGui::BeginDisabled(!perspective);
-  if (ImGui::SliderFloat("##view angle", &angle, 10, 120, "%.0f°", ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##view angle", angle, 10, 120, "%.0f°", ImGuiSliderFlags_AlwaysClamp)) {
     state.camera.view_angle_deg = static_cast<double>(angle);
     actions.changed = true;
   }
@@ -464,8 +464,7 @@ void Panels::drawColour(ViewState& state, const PanelFacts& facts, PanelActions&
 void Panels::drawDetail(ViewState& state, PanelActions& actions) {
   float lod = static_cast<float>(state.lod_pixels);
   label("error, pixels");
-  if (ImGui::SliderFloat("##error", &lod, 0, 16, "%.2f",
-                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##error", lod, 0, 16, "%.2f", ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
     state.lod_pixels = static_cast<double>(lod);
     actions.changed = true;
   }
@@ -474,8 +473,8 @@ void Panels::drawDetail(ViewState& state, PanelActions& actions) {
   actions.dragging |= isDragged();
   int mebibytes = static_cast<int>(std::min<uint64_t>(state.memory_bytes >> 20, 1 << 30));
   label("memory, MiB");
-  if (ImGui::SliderInt("##memory", &mebibytes, 64, 65536, "%d",
-                       ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
+  if (slider("##memory", mebibytes, 64, 65536, "%d",
+             ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
   actions.changed |= ImGui::IsItemDeactivatedAfterEdit();
   nameWidget("memory, MiB");

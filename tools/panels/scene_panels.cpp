@@ -65,8 +65,7 @@ std::string coordinateFormat(double coordinate, double lowest, double highest) {
 void opacitySlider(const char* text, const std::string& name, double& opacity, PanelActions& actions) {
   auto value = static_cast<float>(opacity);
   label(text);
-  if (ImGui::SliderFloat(fmt::format("##{}", name).c_str(), &value, 0.05f, 1, "%.2f",
-                         ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider(fmt::format("##{}", name).c_str(), value, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
     opacity = static_cast<double>(value);
     actions.changed = true;
   }
@@ -240,15 +239,14 @@ void CutPanel::drawPlane(ListedPlane& plane, const std::string& name, const View
   const double lowest = centre - reach, highest = centre + reach;
   double place = glm::dot(scale.along, plane.point);
   label(scale.name);
-  if (ImGui::SliderScalar("##place", ImGuiDataType_Double, &place, &lowest, &highest,
-                          coordinateFormat(place, lowest, highest).c_str())) {
+  if (slider("##place", place, lowest, highest, coordinateFormat(place, lowest, highest).c_str(), 0)) {
     plane.point = middle + (place - centre) * scale.along;
     actions.changed = true;
   }
   actions.dragging |= isDragged();
   nameWidget(name);
   nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
-  hint("drag it here or in the picture; Ctrl + click to type a number");
+  hint("drag it here or in the picture; double click to type a number");
 }
 
 /// Draws the numbers of the plane's direction.
@@ -272,7 +270,7 @@ void CutPanel::drawNormal(ListedPlane& plane, const std::string& name, PanelActi
 void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
   auto opacity = static_cast<float>(state.slice_opacity.factor);
   label("opacity");
-  if (ImGui::SliderFloat("##opacity", &opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##opacity", opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
     state.slice_opacity.factor = static_cast<double>(opacity);
     actions.changed = true;
   }
@@ -429,13 +427,12 @@ void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelAc
   const double highest = info == all.end() ? one.value : info->max;
   label("value");
   ImGui::BeginDisabled(info == all.end());
-  if (ImGui::SliderScalar("##value", ImGuiDataType_Double, &one.value, &lowest, &highest, "%.5g",
-                          ImGuiSliderFlags_AlwaysClamp))
+  if (slider("##value", one.value, lowest, highest, "%.5g", ImGuiSliderFlags_AlwaysClamp))
     actions.changed = true;
   ImGui::EndDisabled();
   actions.dragging |= isDragged();
   nameWidget(name);
-  hint("Ctrl + click to type a number");
+  hint("double click to type a number");
 }
 
 /// Draws a colour of its own, or the function's, which choosing another one replaces.
