@@ -122,7 +122,7 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
   ImGui::EndDisabled();
   ImGui::SameLine(0.5f * ImGui::GetContentRegionMax().x);
   commandOption(Command::kPlaneFrames, actions, "frames of cuts", facts.shows_frames);
-  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
+  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, facts.further, actions);
   if (!state.isosurfaces.empty()) drawFinerThanStored(state, facts);
   cuts_.draw(state, actions);
   std::optional<size_t> seen = state.markers.size();  // a click in the picture unfolds nothing
@@ -156,35 +156,6 @@ void drawElsewhere(const std::vector<std::string>& names, PanelActions& actions)
   }
 }
 
-/// Draws the scalars that the sources have besides, at the end of a list of scalars.
-void drawFurther(const FurtherScalars& further, bool for_opacities, PanelActions& actions) {
-  if (further.from.empty()) {
-    if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());
-    if (!further.note.empty()) nameWidget("note " + further.note);
-    return;
-  }
-  actions.looks_for_scalars = true;
-  ImGui::Separator();
-  const bool has_stored = std::ranges::any_of(further.scalars, [](const auto& one) { return !one.derived; });
-  if (further.is_looking || further.is_busy || has_stored)
-    ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
-                              : further.is_busy  ? "one is being added"
-                                                 : "more, added when chosen:");
-  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
-  ImGui::BeginDisabled(further.is_busy);
-  for (const bool derived : {false, true}) {
-    const auto is_one = [derived](const SourceScalar& one) { return one.derived == derived; };
-    if (derived && std::ranges::any_of(further.scalars, is_one)) ImGui::TextDisabled("computed when chosen:");
-    for (const SourceScalar& one : further.scalars) {
-      if (!is_one(one)) continue;
-      if (ImGui::Selectable(scalarTitle(one.name, one.unit).c_str()))
-        actions.add_scalar = {one.name, for_opacities};
-      nameWidget((for_opacities ? "further opacity by " : "further scalar ") + one.name);
-    }
-  }
-  ImGui::EndDisabled();
-}
-
 }  // namespace
 
 void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions) {
@@ -198,7 +169,7 @@ void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelA
       if (chooses) actions.scalar = one.name;
     }
     if (facts.elsewhere) drawElsewhere(*facts.elsewhere, actions);
-    if (facts.further) drawFurther(*facts.further, false, actions);
+    if (facts.further) drawFurther(*facts.further, {}, "further scalar ", actions);
     ImGui::EndCombo();
   } else {
     nameWidget("scalar");
@@ -224,7 +195,7 @@ void Panels::drawOpacityScalars(const ViewState& state, const PanelFacts& facts,
       nameWidget("opacity by " + one.name);
       if (chooses) actions.opacity_scalar = one.name;
     }
-    if (has_further) drawFurther(*facts.further, true, actions);
+    if (has_further) drawFurther(*facts.further, {"", true}, "further opacity by ", actions);
     ImGui::EndCombo();
   } else {
     nameWidget("opacity by");

@@ -150,7 +150,7 @@ void OpenedView::add(const WantedScalar& wanted) {
   adds_to_ = wanted;
   preparation_ =
       std::make_shared<Preparation>(Preparation{viewOptions(), surroundings_.picture_size(), nullptr});
-  preparation_->options.scalar = wanted.for_opacities ? view_->scalar() : scalar;
+  preparation_->options.scalar = wanted.isShown() ? scalar : view_->scalar();
   preparation_->options.preview = view_->preview();
   const bool is_there = view_->hasElsewhere(scalar);
   opening_ = std::make_unique<Opening>(
@@ -201,11 +201,11 @@ void OpenedView::takeWhole() {
     if (adds_to_) {
       options.grid_files = view_->gridFiles();
       options.carried = view_->carriedTo(*preparation->prepared);
-      if (!adds_to_->for_opacities) options.scalar = adds_to_->name;
+      if (adds_to_->isShown()) options.scalar = adds_to_->name;
       options.preview = view_->preview();
       show(*preparation->prepared, options,
            options.grid_files.empty() ? std::vector{cache} : options.grid_files);
-      if (adds_to_->for_opacities) view_->chooseOpacityScalar(adds_to_->name);
+      if (!adds_to_->isShown()) view_->useScalar(*adds_to_);
       return;
     }
     const bool is_kept = opening_files_.size() > 1 || opening_files_.front() != cache;
