@@ -175,7 +175,7 @@ class Addition {
           "scalars",
           cache_.path().string(), manifest().blanked_nodes, survey_.blanked.by_grid);
     if (missing > 0)
-      throw Error(
+      throw LacksValues(
           "{}: {} of its samples have no value of {} ({} not finite in single precision, {} with the blank "
           "value), and every splat needs one; convert again with all scalars",
           cache_.path().string(), missing, listed(report_.scalars), survey_.blanked.not_finite,

@@ -44,10 +44,16 @@ struct AddScalarReport {
   std::vector<std::string> warnings;
 };
 
+/// Thrown if samples that the cache draws have no value of a scalar.
+class LacksValues final : public Error {
+ public:
+  using Error::Error;
+};
+
 /// Adds the scalars. `source` is read twice (a third time if older scalars blanked nodes that the grid does
 /// not). Nodes that the cache draws must have the new values; those of other nodes are left out, with a
-/// warning. Throws Error if the grid is not the one the cache was made from, if a value is missing, or if
-/// something outside fails; UsageError if the cache has a scalar of the name. After an exception the cache is
+/// warning. Throws Error if the grid is not the one the cache was made from, or if something outside
+/// fails; LacksValues if a value is missing; UsageError if the cache has a scalar of the name. After an exception the cache is
 /// as it was. The peak memory of the process, everything included, is options.memory_bytes.
 AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& options, Progress& progress);
 

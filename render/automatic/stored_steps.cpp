@@ -56,28 +56,27 @@ std::string remedy(const CacheReader& cache, size_t variable, const ShownPart& p
                        : "convert again with --value-precision " + finer;
 }
 
-std::vector<std::string> isovaluesFinerThanStored(const CacheReader& cache, const AskedDifferences& asked) {
+std::vector<std::string> isovaluesFinerThanStored(const CacheReader& cache, const AskedIsovalues& asked) {
   std::vector<std::string> warnings;
-  if (asked.isovalues.empty()) return warnings;
-  const size_t variable = asked.iso_variable;
+  const size_t variable = asked.variable;
   const std::optional<ValueHistogram> histogram = stepHistogram(cache, variable);
   const ValueCoding coding = codingOf(cache, histogram);
-  for (const std::string& text : asked.isovalues) {
-    const double value = std::strtod(text.c_str(), nullptr);
+  for (const double value : asked.values) {
     const double step = stepOf(cache, variable, coding, value, value);
     if (!histogram || !(step > 0)) continue;
     const std::string& name = cache.manifest().variables[variable].name;
     const double share = histogram->shareBelow(value + step) - histogram->shareBelow(value - step);
     if (share > kLargestShare)
       warnings.push_back(fmt::format(
-          "isovalue {} of {}: {:.0f} % of the volume lie within a step of its stored values, {:.2g}, where "
+          "isovalue {:.6g} of {}: {:.0f} % of the volume lie within a step of its stored values, {:.2g}, "
+          "where "
           "the "
           "surface follows their rounding; {}",
-          text, name, 100 * share, step, remedy(cache, variable, {value, value}, step, coding.spread)));
+          value, name, 100 * share, step, remedy(cache, variable, {value, value}, step, coding.spread)));
     else if (step > kWidestStep * coding.spread.scaleAt(value) && coding.spread.scale > 0)
       warnings.push_back(fmt::format(
-          "isovalue {} of {} is finer than its stored values, which have steps of up to {:.2g} there; {}",
-          text, name, step, remedy(cache, variable, {value, value}, step, coding.spread)));
+          "isovalue {:.6g} of {} is finer than its stored values, which have steps of up to {:.2g} there; {}",
+          value, name, step, remedy(cache, variable, {value, value}, step, coding.spread)));
   }
   return warnings;
 }
@@ -128,7 +127,8 @@ std::vector<std::string> finerThanStored(const CacheReader& cache, const AskedDi
     warnings.push_back(std::move(warning));
     warned.push_back(shown.variable);
   }
-  for (std::string& warning : isovaluesFinerThanStored(cache, asked)) warnings.push_back(std::move(warning));
+  for (const AskedIsovalues& one : asked.isosurfaces)
+    for (std::string& warning : isovaluesFinerThanStored(cache, one)) warnings.push_back(std::move(warning));
   return warnings;
 }
 

@@ -20,11 +20,18 @@ struct ShownAxis {
   bool operator==(const ShownAxis& other) const;
 };
 
+/// Isosurfaces of a scalar.
+struct AskedIsovalues {
+  size_t variable = 0;
+  std::vector<double> values;
+
+  bool operator==(const AskedIsovalues&) const = default;
+};
+
 /// The differences that a picture asks for.
 struct AskedDifferences {
   std::vector<ShownAxis> axes;
-  size_t iso_variable = 0;
-  std::vector<std::string> isovalues = {};  // of numbers, as they are to be printed
+  std::vector<AskedIsovalues> isosurfaces = {};
 
   bool operator==(const AskedDifferences&) const = default;
 };

@@ -57,9 +57,10 @@ uint64_t nextContent() {
 
 /// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
-  Pools(const CacheReader& cache, const BrickSource::Variables& variables, const FrameBudget& budget_,
+  Pools(const CacheReader& cache, const BrickSource::Variables& variables_, const FrameBudget& budget_,
         const PagerOptions& pager_, ComputePermits& permits)
-      : budget(budget_),
+      : variables(variables_),
+        budget(budget_),
         pager(pager_),
         splats(std::make_unique_for_overwrite<ScreenSplat[]>(budget.ring_splats)),
         ring({splats.get(), budget.ring_splats}),
@@ -67,6 +68,7 @@ struct FramePipeline::Pools {
         source(cache, variables, pager, budget.cache_bytes, budget.kept_bytes),
         workers(source, sweep, ring, permits, budget.workers) {}
 
+  const BrickSource::Variables variables;
   const FrameBudget budget;
   const PagerOptions pager;
   const std::unique_ptr<ScreenSplat[]> splats;
@@ -95,7 +97,7 @@ FramePipeline::~FramePipeline() {
   endPrefetch();
 }
 
-FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
+FrameBudget FramePipeline::budgetOf(const FrameOptions& options, bool two_scalars) const {
   const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
   const FrameBudget::Fixed fixed{
       planner_.bytes(),
@@ -108,26 +110,24 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options) const {
       planner_.mostSplats(),
       options.size,
       cache_.series().steps.size() > 1,
-      coloured_by_.has_value(),
+      two_scalars,
       options.ranks != nullptr};
   return FrameBudget::of(options.memory_bytes, fixed, options.threads);
 }
 
-void FramePipeline::makePools(const FrameOptions& options) {
+void FramePipeline::makePools(const FrameOptions& options, const BrickSource::Variables& variables) {
   // Steps differ in this; the pools stay.
-  least_pager_bytes_ =
-      std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, {variable_, coloured_by_}));
-  const FrameBudget budget = budgetOf(options);
+  least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variables));
+  const FrameBudget budget = budgetOf(options, variables.second.has_value());
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
   pager.way = options.read_by;
-  if (pools_ && pools_->budget == budget && pools_->pager.way == pager.way &&
-      permits_->count() == threadsOf(options))
+  if (pools_ && pools_->variables == variables && pools_->budget == budget &&
+      pools_->pager.way == pager.way && permits_->count() == threadsOf(options))
     return;
   dropPools();  // before the new ones take their memory
   permits_ = std::make_unique<ComputePermits>(threadsOf(options));
-  auto fresh = std::make_unique<Pools>(cache_, BrickSource::Variables(variable_, coloured_by_), budget, pager,
-                                       *permits_);
+  auto fresh = std::make_unique<Pools>(cache_, variables, budget, pager, *permits_);
   requireSpareMemory();
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
@@ -138,9 +138,8 @@ bool FramePipeline::setAside(uint64_t bytes, size_t waiting_splats, const FrameO
   aside_waiting_splats_ = waiting_splats;
   if (bytes == 0) return true;
   try {
-    least_pager_bytes_ =
-        std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, {variable_, coloured_by_}));
-    budgetOf(options);
+    least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variables()));
+    budgetOf(options, coloured_by_.has_value());
     return true;
   } catch (const UsageError&) {
     aside_bytes_ = 0;
@@ -314,7 +313,7 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
 
 void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options,
                            FrameStatistics& statistics) {
-  makePools(options);
+  makePools(options, work.variables.value_or(variables()));
   const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   try {
     {
@@ -354,7 +353,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
                                                   const FrameOptions& options, FrameStatistics& statistics,
                                                   Progress* progress, std::shared_ptr<CardPicture>* on_card) {
   std::optional<TraceScope> starting(std::in_place, "start frame");
-  makePools(options);
+  makePools(options, variables());
   exchange_.reset();
   if (plan.shared) beginExchange(plan, options);
   fillStore(plan, options, on_card != nullptr, statistics);
@@ -503,7 +502,7 @@ void FramePipeline::stopStages() {
 
 void FramePipeline::prefetch(const FramePlan& plan, const FrameOptions& options) {
   endPrefetch();
-  makePools(options);
+  makePools(options, variables());
   std::vector<BrickPart> parts;
   for (const SweptPart& part : plan.parts) parts.push_back(fetchedPart(part));
   pools_->source.startPrefetch(parts, plan.mergings);

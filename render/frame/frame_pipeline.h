@@ -24,6 +24,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -38,6 +39,7 @@
 #include "render/project/brick_store.h"
 #include "render/ranks/splat_exchange.h"
 #include "render/surface/face_meshes.h"
+#include "render/surface/iso_groups.h"
 #include "render/surface/iso_layers.h"
 #include "render/surface/iso_meshes.h"
 #include "render/surface/scene_triangles.h"
@@ -56,7 +58,8 @@ struct SamplingWork;
 /// Keeps the surfaces' memory from picture to picture.
 class LayerDrawer {
  public:
-  /// Gives the splats of some bricks to whoever samples them, and returns once all are sampled.
+  /// Gives the splats of some bricks to whoever samples them, and returns once all are sampled. Those of other scalars than the picture's
+  /// cost it the bricks that are kept, since they take their memory.
   using Sample = std::function<void(const SamplingWork& work)>;
 
   /// The cache and the planner must outlive it.
@@ -73,10 +76,10 @@ class LayerDrawer {
   /// Gives up the memory that is kept from picture to picture.
   void release() {
     surface_memory_ = {};
-    iso_meshes_.release();
+    iso_meshes_.clear();
   }
   /// The cache is at another step.
-  void stepChanged() { iso_meshes_.release(); }
+  void stepChanged() { iso_meshes_.clear(); }
 
   /// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles,
   /// samples of slices and of surfaces, and a layer and a half a pixel with a window behind it. The same for
@@ -85,23 +88,29 @@ class LayerDrawer {
 
  private:
   struct IsoInput {
+    const IsoGroup& group;
+    std::span<const BrickPart> parts;
     const Sample& sample;
     double depth_origin;
     const ColourTable* opacities;  // of the picture's function; null: not needed
   };
-  const IsoMeshes::Meshes* isoMeshes(const FramePlan& plan, const FrameOptions& options,
+  PictureScalars scalars() const { return {variable_, coloured_by_}; }
+  const IsoMeshes::Meshes* isoMeshes(const IsoInput& input, const FramePlan& plan,
+                                     const FrameOptions& options,
                                      const std::function<void()>& throw_if_stopped,
                                      FrameStatistics& statistics);
-  std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
-                                       const IsoInput& input, FrameStatistics& statistics) const;
+  BrickSource::Variables readFor(const IsoGroup& group) const;
+  IsoLayers isosurfaces(const IsoInput& input, const FramePlan& plan, const FrameOptions& options,
+                        FrameStatistics& statistics) const;
+  uint64_t isoBytes(const FrameOptions& options) const;
 
   const CacheReader& cache_;
   const size_t variable_;
   const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
   FaceMeshes face_meshes_;
-  IsoMeshes iso_meshes_;
-  ScreenVertices surface_memory_;  // of the last picture's surfaces, for the next one's
+  std::map<size_t, IsoMeshes> iso_meshes_;  // by scalar
+  ScreenVertices surface_memory_;           // of the last picture's surfaces, for the next one's
 };
 
 /// The stages and pools of one variable, or two, of one cache.
@@ -171,14 +180,15 @@ class FramePipeline {
                                      FrameStatistics& statistics, Progress* progress,
                                      std::shared_ptr<CardPicture>* on_card);
   void stopStages();
-  FrameBudget budgetOf(const FrameOptions& options) const;
+  FrameBudget budgetOf(const FrameOptions& options, bool two_scalars) const;
+  BrickSource::Variables variables() const { return {variable_, coloured_by_}; }
   void fillStore(const FramePlan& plan, const FrameOptions& options, bool on_card,
                  FrameStatistics& statistics);
   void putIntoStore(std::span<const StoredPart> parts, const BorderStyle& borders,
                     const FrameOptions& options, FrameStatistics& statistics);
   BrickPart fetchedPart(const SweptPart& swept) const;
   bool isLeftOut(uint32_t brick, const FramePlan& plan, const FrameOptions& options) const;
-  void makePools(const FrameOptions& options);
+  void makePools(const FrameOptions& options, const BrickSource::Variables& variables);
   void dropPools();
   bool isOfAll(const FrameOptions& options) const;
   Image paint(const FramePlan& plan, std::span<const FrameRegion> regions, const FrameOptions& options,

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <utility>
 
 #include "render/project/footprint.h"
@@ -221,27 +222,35 @@ std::vector<SlicePlan> FramePlanner::planSlices(const ProjectionSettings& settin
   return slices;
 }
 
-/// Plans the bricks for isosurfaces, with those that are transparent in the volume. In the order of the
+/// Plans the bricks for isosurfaces of one scalar, with those that are transparent in the volume. In the order of the
 /// bricks, which is the same for all painters.
-void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions& limits,
-                                   FramePlan& plan) const {
-  if (!options.scene || options.scene->isovalues.empty()) return;
-  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
-  const CutTree tree{cache_.manifest().root, cache_.bricks(),
-                     cache_.brickVariables(of_colours ? coloured_by_->variable : variable_),
-                     of_colours ? colour_subtrees_ : subtrees_};
+std::vector<BrickPart> FramePlanner::isoParts(const IsoGroup& group, const CutOptions& limits,
+                                              FramePlan& plan) const {
+  std::vector<ValueBounds> of_third;
+  const bool of_colours = coloured_by_ && group.variable == coloured_by_->variable;
+  if (!of_colours && group.variable != variable_) of_third = subtreesOf(cache_, group.variable);
+  const std::span<const ValueBounds> own = of_colours ? colour_subtrees_ : subtrees_;
+  const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(group.variable),
+                     of_third.empty() ? own : of_third};
   const double reach = largestReach(plan.settings.view.low_pass_px2);
   const auto has_none = [&](const ValueBounds& bounds) {
     const std::pair<double, double> spread = spreadOf(bounds, reach);
-    const auto& values = options.scene->isovalues;
-    return std::none_of(values.begin(), values.end(),
+    return std::none_of(group.values.begin(), group.values.end(),
                         [&](double v) { return v >= spread.first && v <= spread.second; });
   };
   Cut cut = curvisplat::chooseCut(tree, cutViewOf(plan.settings), has_none, limits);
-  plan.iso_parts = std::move(cut.parts);
-  plan.iso_complete = cut.complete;
-  std::sort(plan.iso_parts.begin(), plan.iso_parts.end(),
+  plan.iso_complete &= cut.complete;
+  std::sort(cut.parts.begin(), cut.parts.end(),
             [](const BrickPart& a, const BrickPart& b) { return a.brick < b.brick; });
+  return std::move(cut.parts);
+}
+
+void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions& limits,
+                                   FramePlan& plan) const {
+  if (!options.scene) return;
+  const auto colours = coloured_by_ ? std::optional(coloured_by_->variable) : std::nullopt;
+  for (const IsoGroup& group : isoGroups(*options.scene, {variable_, colours}))
+    plan.iso_parts.push_back(isoParts(group, limits, plan));
 }
 
 /// Null where all errors count: light and the gradient's opacity show the splats themselves.

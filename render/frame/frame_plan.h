@@ -26,6 +26,7 @@
 #include "render/project/shadow_grid.h"
 #include "render/project/tile_set.h"
 #include "render/ranks/splat_exchange.h"
+#include "render/surface/iso_groups.h"
 #include "render/sweep/sweep_buffer.h"
 #include "stream/base/mutex.h"
 #include "stream/cache/cache_reader.h"
@@ -56,7 +57,7 @@ struct FramePlan {
   DepthKeys keys;
   std::vector<SweptPart> parts;  // of the cut, in the sweep's order
   std::vector<SlicePlan> slices = {};
-  std::vector<BrickPart> iso_parts = {};                // that may have isosurfaces
+  std::vector<std::vector<BrickPart>> iso_parts = {};   // [isoGroups()] that may have its isosurfaces
   bool iso_complete = true;                             // as Cut's
   std::shared_ptr<const PixelLayers> layers = nullptr;  // those of settings, where there are some
   uint64_t parts_hidden = 0;                            // of the cut, behind opaque layers: not in `parts`
@@ -124,6 +125,7 @@ class FramePlanner {
   std::function<double(uint32_t)> errorWeightIn(const ProjectionSettings& settings, const CutView& view,
                                                 double lod_pixels) const;
   void planIsosurfaces(const FrameOptions& options, const CutOptions& limits, FramePlan& plan) const;
+  std::vector<BrickPart> isoParts(const IsoGroup& group, const CutOptions& limits, FramePlan& plan) const;
   void forgetFunctions();
   std::shared_ptr<const GradientOpacity> gradientOf(const FrameOptions& options) const;
   std::shared_ptr<const ShadowGrid> shadowsOf(const ProjectionSettings& settings,

@@ -49,6 +49,7 @@ struct SamplingWork {
   /// Takes the splats of parts[part], whose positions count from `cell_min`. Any thread.
   std::function<void(size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& splats)> take;
   bool keep_going = false;
+  std::optional<BrickSource::Variables> variables = std::nullopt;  // none: the picture's
 };
 
 class FrameWorkers {

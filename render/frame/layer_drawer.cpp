@@ -63,11 +63,10 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
   const bool peels =
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
       std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent) ||
-      (!options.scene->isovalues.empty() && !options.scene->iso_opacity.opaque()) ||
+      (options.scene->hasIsosurfaces() && !options.scene->iso_opacity.opaque()) ||
       std::any_of(options.scene->curves.begin(), options.scene->curves.end(),
                   [](const Curves& curves) { return curves.opacity < 1; });
-  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 16, kTriangleBytes = 8,
-                     kPointBytes = 28;
+  constexpr uint64_t kLayerBytes = 64, kVertexBytes = 16, kTriangleBytes = 8, kPointBytes = 28;
   const uint64_t tile_bytes = kSampleTileBytes + (options.scene->curves.empty() ? 0 : CapsuleQueue::kBytes);
   uint64_t bytes = tile_bytes * (peels ? kMaxPeels : 1) * threadsOrCores(options.threads) +
                    options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
@@ -78,14 +77,26 @@ uint64_t LayerDrawer::bytes(const FrameOptions& options) const {
     bytes += curves.set->bytes() + kPointBytes * curves.set->positions.size();
     if (curves.whole && curves.whole != curves.set) bytes += curves.whole->bytes();
   }
-  // Isosurfaces are of the grid's cells or of the field of splats, never of both at once.
-  if (!options.scene->isovalues.empty())
-    bytes += std::max(
-        IsoMeshes::bytes(cache_.manifest(), coloured_by_.has_value(), options.scene->isovalues.size()),
-        isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels());
+  bytes += isoBytes(options);
   if (!options.scene->grid_surfaces.empty())
     bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
+}
+
+/// Isosurfaces of a scalar are of the grid's cells or of the field of splats, never of both at once; those of the field are found for one
+/// scalar after the other. The most is taken where all lie in cells, or all but those of the scalar that takes least there.
+uint64_t LayerDrawer::isoBytes(const FrameOptions& options) const {
+  constexpr uint64_t kBytesAPixel = 48;
+  const uint64_t of_layers = kBytesAPixel * options.size.pixels();
+  const uint64_t of_field = of_layers + isoSplatBytes(options) + isoTracerBytes(options);
+  uint64_t all = 0, least = UINT64_MAX;
+  for (const IsoGroup& group : isoGroups(*options.scene, scalars())) {
+    const uint64_t of_cells =
+        IsoMeshes::bytes(cache_.manifest(), coloured_by_ || group.other, group.values.size());
+    all += std::max(of_cells, of_layers);
+    least = std::min(least, std::max(of_cells, of_layers));
+  }
+  return all == 0 ? 0 : std::max(all, all - least + of_field);
 }
 
 void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sample& sample,
@@ -119,23 +130,28 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
   const double depth_origin = view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
   std::optional<ColourTable> opacities;
   if (options.scene->usesOpacities()) opacities.emplace(planner_.transferFunction());
-  const IsoMeshes::Meshes* const meshes = isoMeshes(plan, options, throw_if_stopped, statistics);
-  std::optional<IsoLayers> isosurfaces;
-  if (!meshes)
-    isosurfaces = this->isosurfaces(plan, options, {sample, depth_origin, opacities ? &*opacities : nullptr},
-                                    statistics);
-  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
+  const std::vector<IsoGroup> groups = isoGroups(*options.scene, scalars());
+  std::erase_if(iso_meshes_, [&](const auto& kept) {
+    return std::ranges::find(groups, kept.first, &IsoGroup::variable) == groups.end();
+  });
+  std::vector<IsoLayers> isosurfaces;
   IsoSurfaces in_cells;
-  if (meshes)
-    in_cells = isoSurfaces(*meshes, *options.scene, coloured_by_.has_value(), planner_.colours(),
-                           opacities ? &*opacities : nullptr);
+  for (size_t n = 0; n < groups.size(); ++n) {
+    const IsoInput input{groups[n], plan.iso_parts.at(n), sample, depth_origin,
+                         opacities ? &*opacities : nullptr};
+    if (const IsoMeshes::Meshes* const meshes = isoMeshes(input, plan, options, throw_if_stopped, statistics))
+      addIsoSurfaces(*meshes, groups[n], {planner_.colours(), input.opacities}, in_cells);
+    else
+      isosurfaces.push_back(this->isosurfaces(input, plan, options, statistics));
+  }
+  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   const SceneLook look{planner_.colours(),
                        options.light,
                        plan.settings.clip_planes,
                        depth_origin,
                        opacities ? &*opacities : nullptr,
                        of_opacity,
-                       isosurfaces ? &*isosurfaces : nullptr,
+                       isosurfaces,
                        in_cells.values,
                        plan.settings.shadows.get(),
                        throw_if_stopped};
@@ -149,63 +165,71 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
 }
 
 /// The isosurfaces in the cells of the grid; null where they are those of the field of splats.
-const IsoMeshes::Meshes* LayerDrawer::isoMeshes(const FramePlan& plan, const FrameOptions& options,
+const IsoMeshes::Meshes* LayerDrawer::isoMeshes(const IsoInput& input, const FramePlan& plan,
+                                                const FrameOptions& options,
                                                 const std::function<void()>& throw_if_stopped,
                                                 FrameStatistics& statistics) {
-  if (options.scene->isovalues.empty()) {
-    iso_meshes_.release();
-    return nullptr;
-  }
-  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
-  const bool needs_other = coloured_by_ && (!of_colours || options.scene->iso_opacity.by_function);
-  IsoMeshes::Wanted wanted{options.scene->isovalues, plan.settings.clip_planes};
-  wanted.variable = of_colours ? *coloured_by_ : variable_;
-  if (needs_other) wanted.other = of_colours ? variable_ : *coloured_by_;
-  wanted.other_is_of_opacities = of_colours;
+  const IsoGroup& group = input.group;
+  IsoMeshes& kept = iso_meshes_[group.variable];
+  IsoMeshes::Wanted wanted{{group.values.begin(), group.values.end()}, plan.settings.clip_planes};
+  wanted.variable = group.variable;
+  wanted.other = group.other;
+  wanted.other_is_of_opacities = group.opacities_of_other && !group.colours_of_other;
   wanted.keep_going = options.keep_going;
   const StageTimer timer(statistics.surfaces_s, "find isosurfaces");
-  const IsoMeshes::Meshes* const meshes = iso_meshes_.of(cache_, wanted, throw_if_stopped);
+  const IsoMeshes::Meshes* const meshes = kept.of(cache_, wanted, throw_if_stopped);
   // Any damaged leaf makes the isosurfaces those of the field, whether its rays meet that leaf or not.
   PrepareStatistics unreadable;
-  for (const auto& [brick, reason] : iso_meshes_.damaged())
-    unreadable.bricks_unreadable.push_back({brick, reason});
+  for (const auto& [brick, reason] : kept.damaged()) unreadable.bricks_unreadable.push_back({brick, reason});
   combine(statistics, unreadable);
   if (!meshes) return nullptr;
-  const std::vector<uint32_t> bricks = bricksOf(plan.iso_parts);
-  statistics.iso_bricks = bricks.size();
+  const std::vector<uint32_t> bricks = bricksOf(input.parts);
+  statistics.iso_bricks += bricks.size();
   for (const uint32_t brick : bricks) statistics.iso_splats += cache_.bricks()[brick].splats;
   return meshes;
 }
 
+/// Returns the scalars to read for the isosurfaces of a group: the picture's where they suffice.
+BrickSource::Variables LayerDrawer::readFor(const IsoGroup& group) const {
+  const auto is_of_picture = [&](size_t variable) {
+    return variable == variable_ || variable == coloured_by_;
+  };
+  if (is_of_picture(group.variable) && (!group.other || is_of_picture(*group.other)))
+    return {variable_, coloured_by_};
+  return {group.variable, group.other};
+}
+
 /// A part of the picture after the other, each as large as its splats fit into the memory. A tile of 32x32 pixels is
 /// the smallest.
-std::optional<IsoLayers> LayerDrawer::isosurfaces(const FramePlan& plan, const FrameOptions& options,
-                                                  const IsoInput& input, FrameStatistics& statistics) const {
-  if (options.scene->isovalues.empty()) return std::nullopt;
+IsoLayers LayerDrawer::isosurfaces(const IsoInput& input, const FramePlan& plan, const FrameOptions& options,
+                                   FrameStatistics& statistics) const {
   const ProjectionSettings& settings = plan.settings;
-  const bool of_colours = coloured_by_ && options.scene->iso_of_colours;
-  const SheetOpacity& opacity = options.scene->iso_opacity;
-  const IsoLayers::Look look{planner_.colours(),
-                             options.light,
-                             {opacity.factor, opacity.by_function ? input.opacities : nullptr, of_colours},
-                             coloured_by_ && !of_colours,
-                             options.scene->iso_colours};
+  const IsoGroup& group = input.group;
+  const SheetOpacity& opacity = group.opacity;
+  const IsoLayers::Look look{
+      planner_.colours(),
+      options.light,
+      {opacity.factor, opacity.by_function ? input.opacities : nullptr, group.opacities_of_other},
+      group.colours_of_other,
+      group.own_colours};
+  const BrickSource::Variables read = readFor(group);
+  const auto valuesOf = [&](size_t variable, const BrickSource::Splats& splats) {
+    return variable == read.first ? &splats.values : &*splats.second;
+  };
   IsoLayers layers(settings.view.size);
-  statistics.iso_bricks = bricksOf(plan.iso_parts).size();
+  statistics.iso_bricks += bricksOf(input.parts).size();
   std::vector<TileRange> left{{0, layers.tiles()}};
   while (!left.empty()) {
     const TileRange tiles = left.back();
     left.pop_back();
-    IsoSplats splats({settings.view, options.scene->isovalues, settings.borders, settings.clip_planes,
-                      input.depth_origin, tiles, isoSplatBytes(options), coloured_by_.has_value()},
-                     plan.iso_parts.size());
+    IsoSplats splats({settings.view, group.values, settings.borders, settings.clip_planes, input.depth_origin,
+                      tiles, isoSplatBytes(options), group.other.has_value()},
+                     input.parts.size());
     const auto take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& of_part) {
-      const auto& values = of_colours ? *of_part.second : of_part.values;
-      const auto* const second = of_part.second ? &*of_part.second : nullptr;
-      splats.add(part, cell_min, of_part.geometry, values, of_colours ? &of_part.values : second,
-                 of_part.ranges);
+      splats.add(part, cell_min, of_part.geometry, *valuesOf(group.variable, of_part),
+                 group.other ? valuesOf(*group.other, of_part) : nullptr, of_part.ranges);
     };
-    input.sample({cache_, plan.iso_parts, take, options.keep_going});
+    input.sample({cache_, input.parts, take, options.keep_going, read});
     if (splats.overflowed()) {
       if (tiles.count() == 1)
         throw TooLittleMemory(

@@ -85,28 +85,24 @@ void IsoMeshes::release() {
   has_lost_seams_ = false;
 }
 
-IsoSurfaces isoSurfaces(const IsoMeshes::Meshes& meshes, const SurfaceScene& scene, bool two_scalars,
-                        const ColourTable& colours, const ColourTable* opacities) {
-  IsoSurfaces out;
-  const SheetOpacity& opacity = scene.iso_opacity;
-  const bool of_colours = two_scalars && scene.iso_of_colours;
+void addIsoSurfaces(const IsoMeshes::Meshes& meshes, const IsoGroup& group, const IsoColours& look,
+                    IsoSurfaces& to) {
   for (size_t n = 0; n < meshes.size(); ++n) {
     if (meshes[n]->triangles.empty()) continue;
-    const double value = scene.isovalues[n];
+    const double value = group.values[n];
     Surface surface;
     surface.mesh = meshes[n];
-    surface.by_scalar = two_scalars && !of_colours;
-    const std::optional<glm::vec3> own = scene.isoColour(n);
+    surface.by_scalar = group.colours_of_other;
+    const std::optional<glm::vec3> own = group.ownColour(n);
     surface.own_colour = own.has_value();
-    if (own || !surface.by_scalar) surface.colour = own ? *own : colours.at(value);
-    surface.opacity = {opacity.factor, opacity.by_function && of_colours};
-    if (opacity.by_function && !of_colours && opacities)
-      surface.opacity.factor *= double{opacities->opacityAt(value)};
+    if (own || !surface.by_scalar) surface.colour = own ? *own : look.colours.at(value);
+    surface.opacity = {group.opacity.factor, group.opacity.by_function && group.opacities_of_other};
+    if (group.opacity.by_function && !group.opacities_of_other && look.opacities)
+      surface.opacity.factor *= double{look.opacities->opacityAt(value)};
     if (!(surface.opacity.factor > 0)) continue;
-    out.surfaces.push_back(std::move(surface));
-    out.values.push_back(value);
+    to.surfaces.push_back(std::move(surface));
+    to.values.push_back(value);
   }
-  return out;
 }
 
 }  // namespace curvisplat

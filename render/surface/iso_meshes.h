@@ -16,6 +16,7 @@
 
 #include "render/project/plane_cuts.h"
 #include "render/surface/grid_nodes.h"
+#include "render/surface/iso_groups.h"
 #include "render/surface/surface_scene.h"
 #include "stream/cache/cache_reader.h"
 
@@ -32,7 +33,7 @@ class IsoMeshes {
     std::vector<ClipPlane> planes;
     size_t variable = 0;
     std::optional<size_t> other = std::nullopt;  // another variable, whose values the meshes have, too
-    bool other_is_of_opacities = false;          // else they are the meshes' scalars
+    bool other_is_of_opacities = false;          // alone; else they are the meshes' scalars
     bool keep_going = false;                     // false: a damaged leaf is an error
 
     bool operator==(const Wanted& wanted) const;
@@ -63,13 +64,17 @@ class IsoMeshes {
   bool has_lost_seams_ = false;  // nodes that blocks share are not found, whichever scalar is asked for
 };
 
-/// The meshes as surfaces of a scene, and the value of each; those that nothing is seen of are left out. `two_scalars`: of the picture.
-/// `opacities`: of the picture's function, if `iso_opacity` takes them from it.
+/// Isosurfaces as surfaces of a scene, and the value of each.
 struct IsoSurfaces {
   std::vector<Surface> surfaces;
   std::vector<double> values;
 };
-IsoSurfaces isoSurfaces(const IsoMeshes::Meshes& meshes, const SurfaceScene& scene, bool two_scalars,
-                        const ColourTable& colours, const ColourTable* opacities);
+struct IsoColours {
+  const ColourTable& colours;
+  const ColourTable* opacities;  // of the picture's function; null: no opacity is taken from it
+};
+/// Adds the meshes of a group, except for those that nothing is seen of.
+void addIsoSurfaces(const IsoMeshes::Meshes& meshes, const IsoGroup& group, const IsoColours& look,
+                    IsoSurfaces& to);
 
 }  // namespace curvisplat

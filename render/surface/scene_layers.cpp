@@ -426,7 +426,7 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
     for (int y = tile.y0(); y <= tile.y1(); ++y) {
       PixelLayers::Row& out = rows[static_cast<size_t>(y) * columns + number % columns];
       const auto width = static_cast<size_t>(tile.x1() - tile.x0() + 1);
-      if (drawn == 0 && pixel_slices.empty() && !look.isosurfaces) {
+      if (drawn == 0 && pixel_slices.empty() && look.isosurfaces.empty()) {
         out.counts.assign(width, 0);
         continue;
       }
@@ -444,9 +444,8 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
         const auto of_samples = sampled.at(static_cast<size_t>(x - tile.x0()));
         appendShadowed(of_samples, look, view, {x + 0.5, y + 0.5}, out.layers);
         pixel_slices.append(x, y, out.layers);
-        if (look.isosurfaces) {
-          appendShadowed(look.isosurfaces->at(x, y), look, view, {x + 0.5, y + 0.5}, out.layers);
-        }
+        for (const IsoLayers& isosurfaces : look.isosurfaces)
+          appendShadowed(isosurfaces.at(x, y), look, view, {x + 0.5, y + 0.5}, out.layers);
         out.endPixel(before);
       }
     }

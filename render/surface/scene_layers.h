@@ -35,7 +35,7 @@ struct SceneLook {
   // scalar, that scalar's samples of slices.
   const ColourTable* opacities = nullptr;
   std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
-  const IsoLayers* isosurfaces = nullptr;
+  std::span<const IsoLayers> isosurfaces = {};  // of one scalar each
   std::span<const double> isovalues = {};       // of the scene's last surfaces, which are isosurfaces
   const ShadowGrid* shadows = nullptr;          // of the volume, on surfaces and isosurfaces
   std::function<void()> throw_if_stopped = {};  // any thread

@@ -104,6 +104,13 @@ struct Curves {
   bool places = false;                        // points: where each is at that time
 };
 
+/// Isosurfaces of a scalar of the cache that gives the picture neither colours nor opacities, or of the other one of its two.
+struct FurtherIsosurfaces {
+  size_t variable = 0;
+  std::vector<double> values = {};
+  std::vector<std::optional<glm::vec3>> own_colours = {};  // as `values`, or empty; none: the function's
+};
+
 /// The surfaces, slices, isosurfaces and curves of a picture, and whether the volume is drawn.
 struct SurfaceScene {
   std::vector<Surface> surfaces;
@@ -112,19 +119,16 @@ struct SurfaceScene {
   double slice_opacity = 1;
   bool slices_by_function = false;  // times the function's opacity; of two scalars, of that of the opacities
   std::vector<double> isovalues;    // of the picture's scalar; of two, of that of the opacities
-  bool iso_of_colours = false;      // of two scalars: of that of the colours
   std::vector<std::optional<glm::vec3>> iso_colours = {};  // as `isovalues`, or empty; none: the function's
-  SheetOpacity iso_opacity = {};                           // by_function: the picture's opacities
-  bool volume = true;                                      // false: what else there is alone
+  std::vector<FurtherIsosurfaces> further_isosurfaces = {};
+  SheetOpacity iso_opacity = {};  // by_function: the picture's opacities
+  bool volume = true;             // false: what else there is alone
   std::vector<Curves> curves = {};
 
-  /// The colour that an isosurface has of its own, if it has one.
-  std::optional<glm::vec3> isoColour(size_t n) const {
-    return iso_colours.empty() ? std::nullopt : iso_colours.at(n);
-  }
+  bool hasIsosurfaces() const { return !isovalues.empty() || !further_isosurfaces.empty(); }
   /// Whether it has nothing that makes layers.
   bool empty() const {
-    return surfaces.empty() && grid_surfaces.empty() && slices.empty() && isovalues.empty() && curves.empty();
+    return surfaces.empty() && grid_surfaces.empty() && slices.empty() && !hasIsosurfaces() && curves.empty();
   }
   /// Whether any opacity is that of the picture's function.
   bool usesOpacities() const {

@@ -110,6 +110,7 @@ struct ReadVariables {
 
   ReadVariables(size_t only) : first(only) {}
   ReadVariables(size_t of_both, std::optional<size_t> other) : first(of_both), second(other) {}
+  bool operator==(const ReadVariables&) const = default;
 };
 
 /// Reads a frame's bricks ahead, on a thread of its own.

@@ -41,6 +41,52 @@ TEST_F(KeptCaches, WhatIsKnownOfAFileMayBeDamaged) {
   EXPECT_EQ(kept().size(), 1u);
 }
 
+/// The pressure of some nodes is negative, so that they have no Mach number: it is kept apart, as `convert` does.
+TEST_F(KeptCaches, AScalarThatSomeNodesLackIsAdded) {
+  constexpr std::array<int32_t, 3> kNodes{14, 12, 10};
+  std::ofstream grid("flow.xyz", std::ios::binary), flow("flow.q", std::ios::binary);
+  const auto write = [](std::ofstream& file, const auto& values) {
+    file.write(reinterpret_cast<const char*>(values.data()),
+               static_cast<std::streamsize>(values.size() * sizeof(values[0])));
+  };
+  std::vector<float> places, values;
+  const size_t nodes = 14 * 12 * 10;
+  for (int axis = 0; axis < 3; ++axis)
+    for (size_t n = 0; n < nodes; ++n) {
+      const size_t index[] = {n % 14, n / 14 % 12, n / (14 * 12)};
+      places.push_back(static_cast<float>(index[axis]));
+    }
+  for (int q = 0; q < 5; ++q)
+    for (size_t n = 0; n < nodes; ++n) {
+      const float along = static_cast<float>(n % 14) / 14;
+      const bool is_odd = n % 331 == 0;  // 6 nodes
+      values.push_back(q == 0   ? 1 + along
+                       : q == 1 ? 0.5f + along
+                       : q < 4  ? 0.1f
+                       : is_odd ? 0.01f
+                                : 3 + along);
+    }
+  write(grid, kNodes);
+  write(grid, places);
+  write(flow, kNodes);
+  write(flow, std::array<float, 4>{0.5f, 0, 1, 0});
+  write(flow, values);
+  grid.close();
+  flow.close();
+  const auto drawn = [](const Words& input, const std::string& scalar) {
+    run(input + Words{"-o", "drawn.pfm", "--size", "60x50", "--scalar", scalar});
+    return readImage("drawn.pfm").rgba;
+  };
+  const Words opened{"render", "flow.xyz", "flow.q"};
+  const auto before = drawn(opened, "density");
+  const auto added = drawn(opened, "mach_number");
+  EXPECT_EQ(kept().size(), 1u);
+  EXPECT_EQ(drawn(opened, "density"), before);
+  run({"convert", "flow.xyz", "flow.q", "-o", "flow.splats", "--scalar", "all,mach_number"});
+  EXPECT_EQ(added, drawn({"render", "flow.splats"}, "mach_number"));
+  EXPECT_NE(added, before);
+}
+
 // The commands that keep caches have neither --tmp nor --no-preflight.
 TEST_F(KeptCaches, CopiesAreTheirOwnersAlone) {
   fs::create_directory("kept");

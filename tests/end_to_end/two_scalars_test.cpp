@@ -28,6 +28,11 @@ double hueAt(const glm::dvec3& at) {
   return 0.5 + 0.5 * std::sin(4 * at.x + 3 * at.y) * std::cos(3 * at.z);
 }
 
+/// A scalar that gives neither colours nor opacities.
+double thirdAt(const glm::dvec3& at) {
+  return 0.8 * at.x + 0.6 * at.y;
+}
+
 const TransferFunction& hues() {
   static const TransferFunction function = TransferFunction::preset("cool-warm", 0, 1, 1);
   return function;
@@ -40,17 +45,23 @@ class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
     convertTo("small.splats", 0, {40, 24, 24});
   }
 
-  static void convertTo(const char* name, double added_to_hues, const std::array<uint64_t, 3>& nodes) {
+  static void convertTo(const char* name, double added_to_hues, const std::array<uint64_t, 3>& nodes,
+                        size_t scalars = 2) {
     const auto annulus = makeScene("half-annulus");
-    const FunctionGridSource source({gridBlock(nodes[0], nodes[1], nodes[2])}, 2, [&](const GridNode& node) {
-      const glm::dvec3 uvw(double(node.i) / (nodes[0] - 1), double(node.j) / (nodes[1] - 1),
-                           double(node.k) / (nodes[2] - 1));
-      const glm::dvec3 at = annulus->position(uvw);
-      return NodeValues{at, {float(annulus->scalar(at)), float(hueAt(at) + added_to_hues)}};
-    });
+    const FunctionGridSource source(
+        {gridBlock(nodes[0], nodes[1], nodes[2])}, scalars, [&](const GridNode& node) {
+          const glm::dvec3 uvw(double(node.i) / (nodes[0] - 1), double(node.j) / (nodes[1] - 1),
+                               double(node.k) / (nodes[2] - 1));
+          const glm::dvec3 at = annulus->position(uvw);
+          NodeValues values{at, {float(annulus->scalar(at)), float(hueAt(at) + added_to_hues)}};
+          if (scalars == 3) values.scalars.push_back(float(thirdAt(at)));
+          return values;
+        });
     ConvertOptions options;
     options.output = *folder_ / name;
+    options.overwrite = true;
     options.scalars = {0, 1};
+    if (scalars == 3) options.scalars.push_back(2);
     Progress progress;
     convert(source, options, progress);
   }
@@ -223,8 +234,7 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
   const Image reference = marched(function.exact, field_, layers);
   FrameOptions options = knownFrame(kSize);
   auto scene = std::make_shared<SurfaceScene>();
-  scene->isovalues = {kValue};
-  scene->iso_of_colours = true;
+  scene->further_isosurfaces = {{1, {kValue}}};
   scene->iso_opacity = {0.9, false};
   options.scene = scene;
   const double even = db(drawn(function.table, options), reference);
@@ -240,14 +250,90 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
   EXPECT_EQ(drawn(function.table, options).rgba, picture.rgba);
 }
 
+/// Isosurfaces of the opacities' scalar, of the colours' and of a third one, in the cells of a grid and of the field of splats.
+TEST_F(TwoScalarsTest, IsosurfacesAreOfAllScalarsAtOnce) {
+  constexpr double kOwn = 0.5, kOfColours = 0.6, kThird = -0.3;
+  const glm::vec3 green(0.2f, 0.8f, 0.3f);
+  const KnownFunction function = KnownFunction::of("smooth");
+  const auto solid = [](const glm::dvec3&) { return 0.7; };
+  const auto red = glm::vec3(0.9f, 0.2f, 0.1f);
+  const std::array<ReferenceLayers, 3> parts{
+      isoLayer(*annulus_, kOwn, glm::dvec3(red), 0.7),
+      isoLayer(*annulus_, {hueAt, kOfColours, hues().at(kOfColours).colour, solid}),
+      isoLayer(*annulus_, {thirdAt, kThird, glm::dvec3(green), solid})};
+  const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+    std::vector<ReferenceLayer> found;
+    for (const ReferenceLayers& part : parts) {
+      const std::vector<ReferenceLayer> of_part = part(origin, direction);
+      found.insert(found.end(), of_part.begin(), of_part.end());
+    }
+    return found;
+  };
+  const Image reference = marched(function.exact, field_, layers);
+  FrameOptions options = knownFrame(kSize);
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->isovalues = {kOwn};
+  scene->iso_colours = {red};
+  scene->further_isosurfaces = {{1, {kOfColours}}, {2, {kThird}, {green}}};
+  scene->iso_opacity = {0.7};
+  options.scene = scene;
+  // The first has more nodes than isosurfaces are contoured in the cells of.
+  for (const uint64_t nodes : {130, 128}) {
+    convertTo("three.splats", 0, {nodes, 64, 64}, 3);
+    const CacheReader cache(*folder_ / "three.splats");
+    const auto drawn_with = [&](const FrameOptions& with) {
+      FrameRenderer renderer(cache, DrawnScalars({0, function.table}, {1, hues()}), Backend::kCpu);
+      FrameStatistics statistics;
+      return renderer.render(halfAnnulusCamera(), with, statistics);
+    };
+    const Image picture = drawn_with(options);
+    const double all = db(picture, reference);
+    FrameOptions fewer = options;
+    auto without = std::make_shared<SurfaceScene>(*scene);
+    without->further_isosurfaces.pop_back();
+    fewer.scene = without;
+    const double without_third = db(drawn_with(fewer), reference);
+    fmt::print("isosurfaces of three scalars, {} nodes along i: {:.1f} dB, without the third {:.1f} dB\n",
+               nodes, all, without_third);
+    EXPECT_GE(all, 36.5);  // outlines are smooth here
+    EXPECT_LT(without_third, 30);
+    options.threads = 1;
+    options.memory_bytes = uint64_t{192} << 20;
+    EXPECT_EQ(drawn_with(options).rgba, picture.rgba);
+    options.threads = 0;
+    options.memory_bytes = FrameOptions().memory_bytes;
+  }
+}
+
+/// Isosurfaces of another scalar take their opacities from the function of a picture of one scalar.
+TEST_F(TwoScalarsTest, IsosurfacesOfAnotherHaveTheOpacitiesOfTheOneScalar) {
+  constexpr double kValue = 0.6;
+  const KnownFunction function = KnownFunction::of("smooth");
+  const double unit = function.table.opacityUnit();
+  const ReferenceLayers layers = isoLayer(
+      *annulus_, {hueAt, kValue, glm::dvec3(0.5), [&](const glm::dvec3& at) {
+                    return 0.9 * -std::expm1(-function.exact(annulus_->scalar(at)).extinction * unit);
+                  }});
+  const OpticalFunction nothing = [](double) { return OpticalProperties{}; };
+  const Image reference = marched(nothing, field_, layers);
+  FrameOptions options = knownFrame(kSize);
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->further_isosurfaces = {{1, {kValue}, {glm::vec3(0.5f)}}};
+  scene->iso_opacity = {0.9, true};
+  scene->volume = false;
+  options.scene = scene;
+  const Image picture = drawCache(*folder_ / "a.splats", function.table, halfAnnulusCamera(), options);
+  fmt::print("one scalar, isosurface of another with its opacity: {:.1f} dB\n", db(picture, reference));
+  EXPECT_GE(db(picture, reference), 45);
+}
+
 /// Bricks are left out by the bounds of the isosurface's scalar, not of the other's.
 TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
   convertTo("far.splats", 10, {128, 64, 64});
   FrameOptions options = knownFrame(kSize);
   const auto sceneWith = [](double isovalue) {
     auto scene = std::make_shared<SurfaceScene>();
-    scene->isovalues = {isovalue};
-    scene->iso_of_colours = true;
+    scene->further_isosurfaces = {{1, {isovalue}}};
     scene->volume = false;
     return scene;
   };
@@ -354,7 +440,12 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
   run(render(same));
   EXPECT_EQ(readImage(output).rgba, once.rgba) << rest;
 
-  run(render({"--scalar", "s1", "--iso-by", "s0", "--iso", "0.5", "--volume", "off"}));
+  run(render({"--scalar", "s1", "--opacity-by", "s0", "--iso", "0.5", "--volume", "off"}));
+  const Image of_opacities = readImage(output);
+  for (const Words& named : {Words{"--iso", "s0=0.5"}, Words{"--iso", "0.5", "--iso-by", "s0"}}) {
+    run(render(Words{"--scalar", "s1", "--volume", "off"} + named));
+    EXPECT_EQ(readImage(output).rgba, of_opacities.rgba) << named[1];
+  }
   // Faces and isosurfaces with the opacities of the other.
   const Words two{"--scalar", "s1", "--opacity-by", "s0"};
   const auto with = [&](const Words& more) {
@@ -382,8 +473,12 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
        2,
        ": --opacity-asinh 1,0: expected a WIDTH above zero"},
       {{"--iso-by", "s1"}, 2, "--iso-by s1: needs an isosurface: --iso VALUE"},
-      {{"--iso-by", "s1", "--iso", "0.5"}, 2, "add --opacity-by s1, or --volume off"},
-      {{"--opacity-by", "s0", "--iso-by", "s1", "--iso", "0.5"}, 2, "a picture has two scalars"},
+      {{"--iso", "=0.5"}, 2, "--iso =0.5: no scalar before the '='; expected NAME=VALUE"},
+      {{"--iso", "s0=0.5,s1=0.5"},
+       2,
+       "--iso s0=0.5,s1=0.5: has two scalars; give --iso NAME=VALUE,... once for each"},
+      {{"--iso", "x=0.5"}, 1, "--iso x=0.5: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
+      {{"--iso", "s1=7"}, 1, "--iso 7: no isosurface: the values of s1 go from "},
       {{"--opacity-by", "s0", "--iso", "7"}, 1, "--iso 7: no isosurface: the values of s0 go from "},
       {{"--opacity-by", "s0", "--opacity-tf", "viridis"},
        2,

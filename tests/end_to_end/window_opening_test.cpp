@@ -422,6 +422,31 @@ TEST_F(FurtherScalarTest, OneIsAddedForItsOpacities) {
   expectDraws(commands[0], two);
 }
 
+TEST_F(FurtherScalarTest, OneIsAddedForAnIsosurface) {
+  open();
+  tab("Objects");
+  click("Isosurfaces");
+  click("Add an isosurface");
+  placeOf("isosurface 1");
+  save();
+  click("scalar of isosurface 1");
+  click("isosurface 1 by further volume");
+  ASSERT_TRUE(eventually(
+      [] {
+        return runProgram({"info", "one.splats"}).out.find("volume") != std::string::npos &&
+               !hasWidget("opening");
+      },
+      300));
+  moveTo(rest_);
+  save();
+  const Image drawn = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--scalar"), "f");
+  EXPECT_TRUE(valueOf(commands[0], "--iso").starts_with("volume=")) << valueOf(commands[0], "--iso");
+  expectDraws(commands[0], drawn);
+}
+
 TEST_F(FurtherScalarTest, WithoutTheSourcesNoneIsOffered) {
   fs::rename("a.fun", "away.fun");
   open();

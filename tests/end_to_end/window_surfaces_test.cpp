@@ -150,41 +150,41 @@ TEST_F(WindowSurfaces, IsosurfacesAreMovedAndKeepTheirScalar) {
   EXPECT_GE(difference(save(), middle), 50);
   press("ctrl+y");
   save();
-  // Another scalar's picture has none of this one's isosurfaces, unless the volume is hidden.
+  // It stays in another scalar's picture, in the colours of that one.
   tab("Colour");
   EXPECT_TRUE(eventually([] { return hasWidget("mark at "); }));  // in the curve
   chooseScalar("volume");
   EXPECT_TRUE(gone("mark at "));
   tab("Objects");
-  placeOf("isosurface 1 is not drawn");
-  click("draw isosurface 1");
-  EXPECT_TRUE(gone("isosurface 1 is not drawn"));
-  press("ctrl+z");
-  placeOf("isosurface 1 is not drawn");
   moveTo(rest_);
-  const Image without = saveAndCopy();
+  const Image kept = saveAndCopy();
   click("eye of volume");
   moveTo(rest_);
   const Image alone = saveAndCopy();
-  EXPECT_LT(difference(without, alone), 40);
-  // Its own scalar can be chosen.
+  EXPECT_LT(difference(kept, alone), 40);
+  // A second one of the picture's own scalar is drawn with it.
+  click("Add an isosurface");
+  placeOf("isosurface 2");
+  moveTo(rest_);
+  const Image both = saveAndCopy();
+  EXPECT_LT(difference(alone, both), 45);
+  // Its scalar can be chosen.
   click("scalar of isosurface 1");
   click("isosurface 1 by volume");
   moveTo(rest_);
   const Image of_volume = saveAndCopy();
-  EXPECT_LT(difference(alone, of_volume), 45);
+  EXPECT_LT(difference(both, of_volume), 45);
   const auto commands = close();
-  ASSERT_EQ(commands.size(), 5u);
+  ASSERT_EQ(commands.size(), 6u);
   EXPECT_NE(valueOf(commands[0], "--iso"), valueOf(commands[1], "--iso"));
   // It begins where half of what is seen is on either side, and not in the middle of the range.
   const std::string range = valueOf(commands[0], "--range");
   const double low = std::stod(range), high = std::stod(range.substr(range.find(',') + 1));
   EXPECT_GT(std::abs(std::stod(valueOf(commands[0], "--iso")) - 0.5 * (low + high)), 0.01 * (high - low));
-  EXPECT_EQ(valueOf(commands[2], "--iso"), "");
-  EXPECT_EQ(valueOf(commands[3], "--iso-by"), "f");
-  EXPECT_EQ(valueOf(commands[4], "--iso-by"), "");
-  const Image* const pictures[] = {&middle, &higher, &without, &alone, &of_volume};
-  for (size_t n = 0; n < 5; ++n) expectDraws(commands[n], *pictures[n]);
+  EXPECT_EQ(valueOf(commands[2], "--iso"), "f=" + valueOf(commands[1], "--iso"));
+  EXPECT_EQ(valueOf(commands[5], "--iso").find('='), std::string::npos);
+  const Image* const pictures[] = {&middle, &higher, &kept, &alone, &both, &of_volume};
+  for (size_t n = 0; n < 6; ++n) expectDraws(commands[n], *pictures[n]);
 }
 
 /// An isosurface keeps its own colour when the function's change; the copied command has it, and it is undone.

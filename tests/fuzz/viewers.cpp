@@ -73,7 +73,7 @@ void fuzzClientMessage(std::span<const std::byte> bytes) {
   CURVISPLAT_CHECK_OP(view->size.width, >, 0);
   const ViewState state = viewStateFromJson(view->state, "view", manifest());
   state.function.function();
-  state.frameOptions(view->size);
+  state.frameOptions(view->size, manifest());
 }
 
 const RegisteredFuzzTarget client_message_target("client_message", fuzzClientMessage);

@@ -135,6 +135,7 @@ class Pictures(PythonTest):
                              "--iso-by", two, "--iso-opacity", 0.5, "--iso-colour", "#ff8000", "--classify", "flat")
             with self.assertWarnsRegex(UserWarning, f"of {two} is finer than its stored values"):
                 cache.render(one, size=(16, 12), opacity_by=two, opacity_range=(0.5, 0.50001))
+            self.expect_same(cache.render(one, size=(160, 120), isovalues={two: middle}), "--scalar", one, "--iso", f"{two}={middle!r}")
             both = cache.render(one, size=(160, 120), opacity_by=two)
             self.expect_same(both, "--scalar", one, "--opacity-by", two)
             self.expect_same(cache.render(two, size=(160, 120)), "--scalar", two)

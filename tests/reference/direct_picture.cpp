@@ -127,7 +127,7 @@ PixelLayers sceneLayers(const DirectOptions& options, const ProjectionSettings& 
     isosurfaces->draw(of_values, {colours, settings.light, {scene.iso_opacity.factor}}, kEnough);
   }
   SceneLook look{colours, settings.light, settings.clip_planes, depth_origin, &colours};
-  look.isosurfaces = isosurfaces ? &*isosurfaces : nullptr;
+  if (isosurfaces) look.isosurfaces = {&*isosurfaces, 1};
   return layersOf(scene, settings.view, slices, look);
 }
 

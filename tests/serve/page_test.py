@@ -703,15 +703,17 @@ def two_scalars(tab):
     expect(tab.run(f"{PAGE}.state.function.Points") == own, "the colours' function is as it was")
     changes(tab, lambda: set_value(tab, "#opacity_by", ""), "the same scalar again")
     expect(tab.run(f"{PAGE}.state.opacity_by") is None, "one scalar again")
-    # Isosurfaces of another scalar are drawn by its opacities, and the volume gets its own back when the last one is removed.
+    # Isosurfaces of another scalar are drawn beside the volume, whose opacities stay.
     tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     alone = rest(tab)
     changes(tab, lambda: press(tab, "#add-iso"), "an isosurface")
-    changes(tab, lambda: set_value(tab, "#isosurfaces select", names[1]), "its scalar")
-    changes(tab, lambda: press(tab, "#isosurfaces .dim button"), "to draw it", "other_isosurface")
-    expect(tab.run(f"{PAGE}.state.opacity_by.variable") == names[1], "by the opacities of its scalar")
-    changes(tab, lambda: press(tab, "#isosurfaces button:last-of-type"), "no isosurface")
-    expect(tab.run(f"{PAGE}.state.opacity_by") is None and rest(tab) == alone, "the volume is as before")
+    own = rest(tab)
+    changes(tab, lambda: press(tab, "#add-iso"), "another one")
+    changes(tab, lambda: set_value(tab, "#isosurfaces > :last-child select", names[1]), "its scalar", "other_isosurface")
+    expect(tab.run(f"{PAGE}.state.opacity_by") is None and rest(tab) not in (alone, own), "both are drawn, with the volume's opacities")
+    for _ in range(2):
+        changes(tab, lambda: press(tab, "#isosurfaces button:last-of-type"), "one isosurface less")
+    expect(rest(tab) == alone, "the volume is as before")
     # Another scalar's function is chosen from its own values, also after this one's was edited; the colours stay.
     first = tab.run(f"{PAGE}.state.variable")
     automatic = {}

@@ -59,24 +59,6 @@ ViewState changedState() {
   return state;
 }
 
-TEST(ViewState, OpacitiesTakenForIsosurfacesAreGivenBackWithTheLast) {
-  Manifest manifest;
-  manifest.upper = {1, 1, 1};
-  manifest.variables = {{0, "density", "", 0, 1}, {0, "pressure", "", 0, 1}};
-  ViewState state = firstViewOf(manifest, {300, 200});
-  state.isosurfaces = {{"pressure", 0.5}, {"pressure", 0.6}};
-  state.takeOpacitiesFor("pressure");
-  state.opacity_by = OpacityScalar{"pressure", state.function};
-  state = viewStateFromJson(toJson(state), "test", manifest);
-  EXPECT_FALSE(state.giveOpacitiesBack());
-  state.isosurfaces.pop_back();
-  EXPECT_FALSE(state.giveOpacitiesBack());
-  state.isosurfaces.clear();
-  EXPECT_TRUE(state.giveOpacitiesBack());
-  EXPECT_FALSE(state.opacity_by);
-  EXPECT_FALSE(state.giveOpacitiesBack());
-}
-
 /// The page changes the points alone: a built-in map and its opacities are stated by options even so.
 TEST(ViewState, PointsOfABuiltInMapNeedNoFile) {
   Manifest manifest;
@@ -317,32 +299,32 @@ TEST(RenderCommand, LeavesDefaultsOut) {
             "--parallel-scale 0.7");
 }
 
-/// The isosurfaces are those of the scalar that the picture has; without the volume, of any.
-TEST(ViewState, DrawsIsosurfacesOfOneScalar) {
+/// Isosurfaces of the opacities' scalar come first, and the command names the others' scalars.
+TEST(ViewState, DrawsIsosurfacesOfAllScalars) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   chooseVariable(state, manifest(), "u v");
-  state.isosurfaces = {{"density", 1}, {"u v", 0.25}, {"u v", 0.5, false}, {"density", 2}};
+  state.isosurfaces = {
+      {"density", 1}, {"u v", 0.25}, {"u v", 0.5, false}, {"density", 2, true, glm::vec3(1, 0, 0)}};
   using Values = std::vector<double>;
-  const auto drawn = [&] {
-    const auto scene = state.frameOptions({3, 2}).scene;
-    return scene ? scene->isovalues : Values{};
+  const auto expectDrawn = [&](const Values& own, const std::string& scalar, const Values& further) {
+    const auto scene = state.frameOptions({3, 2}, manifest()).scene;
+    EXPECT_EQ(scene->isovalues, own);
+    ASSERT_EQ(scene->further_isosurfaces.size(), 1u);
+    EXPECT_EQ(manifest().variables[scene->further_isosurfaces[0].variable].name, scalar);
+    EXPECT_EQ(scene->further_isosurfaces[0].values, further);
   };
-  EXPECT_EQ(drawn(), Values{0.25});
+  expectDrawn({0.25}, "density", {1, 2});
+  expectParts(commandText(state, "a.splats"),
+              {"--iso 0.25", "--iso density=1,2", "--iso-colour 'function,function,#ff0000'"});
   state.opacity_by = OpacityScalar{"density", EditedFunction("inferno", 0.5, 2, 0.1)};
-  EXPECT_EQ(drawn(), (Values{1, 2}));
-  EXPECT_FALSE(state.frameOptions({3, 2}).scene->iso_of_colours);
-  state.isosurfaces[0].visible = state.isosurfaces[3].visible = false;
-  EXPECT_EQ(drawn(), Values{0.25});
-  EXPECT_TRUE(state.frameOptions({3, 2}).scene->iso_of_colours);
-  expectParts(commandText(state, "a.splats"), {"--opacity-by density", "--iso 0.25", "--iso-by 'u v'"});
-
+  expectDrawn({1, 2}, "u v", {0.25});
+  expectParts(commandText(state, "a.splats"), {"--opacity-by density", "--iso 1,2", "--iso 'u v=0.25'",
+                                               "--iso-colour 'function,#ff0000,function'"});
   state.opacity_by.reset();
   state.isosurfaces = {{"density", 1}};
-  EXPECT_TRUE(drawn().empty());
-  EXPECT_EQ(commandText(state, "a.splats").find("--iso"), std::string::npos);
   state.volume = false;
-  EXPECT_EQ(drawn(), Values{1});
-  expectParts(commandText(state, "a.splats"), {"--iso 1", "--iso-by density", "--volume off"});
+  expectDrawn({}, "density", {1});
+  expectParts(commandText(state, "a.splats"), {"--iso density=1", "--volume off"});
 }
 
 /// Faces are tinted where they stand in the list, also where a scalar gives all of them their colours; the view stays.
@@ -354,7 +336,7 @@ TEST(ViewState, TintsFacesInACopy) {
   ASSERT_EQ(shown.faces.size(), 2u);
   EXPECT_TRUE(shown.faces[1].visible && shown.faces[1].tinted);
   EXPECT_FALSE(shown.faces[1].opacity.by_function);
-  const auto scene = shown.frameOptions({3, 2}).scene;
+  const auto scene = shown.frameOptions({3, 2}, manifest()).scene;
   ASSERT_EQ(scene->grid_surfaces.size(), 2u);
   EXPECT_FALSE(scene->grid_surfaces[0].own_colour);
   EXPECT_TRUE(scene->grid_surfaces[1].own_colour);
@@ -370,9 +352,9 @@ TEST(ViewState, AnIsosurfaceHasAColourOfItsOwn) {
   EXPECT_EQ(commandText(state).find("--iso-colour"), std::string::npos);
   state.isosurfaces.push_back({"density", 2.5, true, glm::vec3(0, 0.5f, 1)});
   expectParts(commandText(state), {"--iso 1,2.5", "--iso-colour 'function,#0080ff'"});
-  const auto scene = state.frameOptions({3, 2}).scene;
-  EXPECT_EQ(scene->isoColour(0), std::nullopt);
-  EXPECT_EQ(scene->isoColour(1), glm::vec3(0, 0.5f, 1));
+  const auto scene = state.frameOptions({3, 2}, manifest()).scene;
+  EXPECT_EQ(scene->iso_colours.at(0), std::nullopt);
+  EXPECT_EQ(scene->iso_colours.at(1), glm::vec3(0, 0.5f, 1));
 }
 
 /// Lines of the drawn scalar are drawn as by the command that is copied: in the picture's colours, without a bar of their own.
@@ -387,7 +369,7 @@ TEST(ViewState, LinesOfTheScalarThatIsDrawnHaveItsFunction) {
   for (const auto& [variable, bars] : {std::pair("density", 1), {"u v", 2}}) {
     chooseVariable(state, manifest(), variable);
     const bool has_own = bars == 2;
-    const Curves drawn = state.frameOptions({30, 20}).scene->curves.at(0);
+    const Curves drawn = state.frameOptions({30, 20}, manifest()).scene->curves.at(0);
     EXPECT_EQ(drawn.colours != nullptr, has_own);
     EXPECT_EQ(drawn.function != nullptr, has_own);
     const ShownFunctions functions(state, manifest());

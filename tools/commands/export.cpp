@@ -181,8 +181,7 @@ void exportIsosurface(ExportArguments& arguments) {
     checkOutputFile("-o", arguments.output, inputs);
     return exportContour(arguments, cache, variable);
   }
-  for (const std::string& finer :
-       finerThanStored(cache, {{}, variable, {fmt::format("{:g}", options.value)}}))
+  for (const std::string& finer : finerThanStored(cache, {{}, {{variable, {options.value}}}}))
     printMessage("warning: {}", finer);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);

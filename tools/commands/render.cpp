@@ -143,8 +143,10 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
   const StopOnSignals stopping(progress);
   KeptCacheEvents events;
   events.say = [](const std::string& text) { printMessage("{}", text); };
-  return keptCacheOf(files, progress, events, {arguments.scalar.scalar, arguments.opacity.by.scalar},
-                     precision);
+  std::vector<std::string> scalars = isoScalars(arguments.surfaces);
+  scalars.insert(scalars.end(),
+                 {arguments.scalar.scalar, arguments.opacity.by.scalar, arguments.surfaces.surface_by});
+  return keptCacheOf(files, progress, events, scalars, precision);
 }
 
 void render(const RenderArguments& given) {
@@ -188,20 +190,19 @@ void render(const RenderArguments& given) {
     if (!scalars.colour) break;
   }
 
-  options.scene = sceneOf(arguments.surfaces, cache,
-                          {shown, variable, isoOfColours(arguments.opacity, arguments.scalar),
-                           !arguments.opacity.by.scalar.empty(), mapsOn(options.background)});
+  options.scene =
+      sceneOf(arguments.surfaces, cache,
+              {shown, variable, !arguments.opacity.by.scalar.empty(), mapsOn(options.background)});
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
   if (options.scene)
     for (const std::string& miss :
          curvesThatMiss(arguments.surfaces, *options.scene, manifest.lower, manifest.upper))
       printMessage("warning: {}", miss);
-  const bool of_colours = isoOfColours(arguments.opacity, arguments.scalar);
   std::vector<ShownAxis> axes{{variable, transfer_function.axis()}};
   if (scalars.colour) axes.push_back({shown, colours.axis()});
   for (const std::string& finer :
-       finerThanStored(cache, {axes, of_colours ? shown : variable, arguments.surfaces.isovalues}))
+       finerThanStored(cache, {axes, askedIsovalues(options.scene.get(), variable, shown)}))
     printMessage("warning: {}", finer);
 
   const ImageSize picture = options.size;
@@ -327,7 +328,7 @@ void addRender(CLI::App& app) {
   const std::string what = "Data and colours";
   addFunctionOptions(*command, arguments->scalar, what);
   const std::string surfaces = "Surfaces and slices";
-  addOpacityOptions(*command, arguments->opacity, what, surfaces);
+  addOpacityOptions(*command, arguments->opacity, what);
   command
       ->add_option("--classify", arguments->frame.classify,
                    "Classification: pixel (colour varies within a splat) or flat (one colour per splat)")

@@ -76,7 +76,7 @@ std::vector<std::filesystem::path> inputsOf(const RenderArguments& arguments) {
 void checkRenderArguments(const RenderArguments& arguments, ImageSize size) {
   checkMotionArguments(arguments.camera, arguments.steps);
   checkFunctionArguments(arguments.scalar);
-  checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
+  checkOpacityArguments(arguments.opacity, arguments.scalar);
   checkSurfaceArguments(arguments.surfaces, !arguments.opacity.by.scalar.empty());
   checkAnnotationArguments(arguments.annotations);
   checkOutputName(arguments.output, severalFrames(arguments), size);

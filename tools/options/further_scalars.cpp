@@ -16,6 +16,7 @@
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/addition/value_passes.h"
+#include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
@@ -120,6 +121,34 @@ ConvertArguments argumentsFor(const std::vector<fs::path>& files, const fs::path
   return arguments;
 }
 
+/// Converts the files again with the scalars that the cache has and `name`, which not all its samples have, as addScalarToSeries() does.
+void convertAgainWith(const fs::path& cache, const std::vector<fs::path>& files, const std::string& name,
+                      Progress& progress) {
+  const fs::path whole = fs::canonical(cache);
+  const CacheLock lock(whole);
+  const CacheReader before(whole);
+  ConvertArguments arguments = argumentsFor(files, {});
+  arguments.scalars = before.allScalars();
+  arguments.scalars.push_back(name);
+  arguments.refinement = before.manifest().refinement;
+  const std::string folder_name = whole.filename().string() + ".adding";
+  PreviewFolder::removeLeftOnes(whole.parent_path(), folder_name);
+  const PreviewFolder folder(whole.parent_path(), folder_name);  // in the end, of the old one
+  arguments.output = folder.path() / whole.filename();
+  ConvertOptions options = optionsLike(before, arguments.output).convert;
+  const auto source = openSource(arguments, arguments.output);
+  options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
+  options.differing = DifferingScalars::kKeepApart;
+  const ConvertReport report = convert(*source, options, progress);
+  if (!isSameStep(CacheReader(arguments.output).manifest(), before.manifest()))
+    throw Error(
+        "{}: these files and the default options of convert make another cache; convert it again with {}",
+        whole.string(), name);
+  lock.requireStillThere();
+  exchange(arguments.output, whole);
+  for (const std::string& note : report.notes) printMessage("note: {}", note);
+}
+
 /// Computed from the nodes without a solution; few look for these.
 bool isOfGridAlone(const std::string& name) {
   constexpr std::array<std::string_view, 5> kNames{"i", "j", "k", "jacobian", "volume"};
@@ -188,6 +217,8 @@ void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files,
   try {
     for (const std::string& warning : addScalars(*source, options, progress).warnings)
       printMessage("warning: {}", warning);
+  } catch (const LacksValues&) {
+    convertAgainWith(cache, files, name, progress);
   } catch (const UsageError& error) {
     throw Error("{}", error.what());
   }

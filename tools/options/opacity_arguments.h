@@ -15,19 +15,13 @@ struct OpacityArguments {
   /// The scalar of the opacities. Their points and unit are --opacity and --opacity-unit, which
   /// ScalarArguments of the --scalar has.
   ScalarArguments by;
-  std::string iso_scalar;  // of the isosurfaces
 };
 
-/// Adds --opacity-by, --opacity-range, --opacity-asinh and --opacity-tf, and --iso-by, under these headings.
-void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std::string& group,
-                       const std::string& surfaces_group);
-
-/// Whether the isosurfaces of a picture of two scalars are those of the colours.
-bool isoOfColours(const OpacityArguments& arguments, const ScalarArguments& scalar);
+/// Adds --opacity-by, --opacity-range, --opacity-asinh and --opacity-tf under this heading.
+void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std::string& group);
 
 /// Throws UsageError if options contradict each other: without a look at any file.
-void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArguments& scalar,
-                           const SurfaceArguments& surfaces);
+void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArguments& scalar);
 
 /// The scalars of a picture with their functions, and the choice of the one whose opacities are drawn, which chooses
 /// the view as well.

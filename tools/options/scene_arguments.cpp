@@ -17,6 +17,7 @@
 #include "render/mesh/curve_set.h"
 #include "render/mesh/triangle_mesh.h"
 #include "render/surface/curve_times.h"
+#include "render/surface/iso_groups.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
@@ -96,10 +97,26 @@ std::vector<std::string> splitAtCommas(const std::vector<std::string>& texts) {
   return parts;
 }
 
-std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
-  std::vector<double> values;
-  for (const std::string& text : splitAtCommas(texts)) values.push_back(parseNumber("--iso", text));
-  return values;
+/// A value of --iso.
+struct GivenIsovalue {
+  std::string scalar;  // empty: the picture's
+  double value = 0;
+};
+
+/// VALUE,... or NAME=VALUE,... each.
+std::vector<GivenIsovalue> parseIsovalues(const SurfaceArguments& arguments) {
+  std::vector<GivenIsovalue> given;
+  for (const std::string& text : arguments.isovalues) {
+    const size_t equals = text.rfind('=');
+    const std::string scalar = equals == std::string::npos ? arguments.iso_by : text.substr(0, equals);
+    if (equals == 0) throw UsageError("--iso {}: no scalar before the '='; expected NAME=VALUE", text);
+    if (scalar.find('=') != std::string::npos)
+      throw UsageError("--iso {}: has two scalars; give --iso NAME=VALUE,... once for each", text);
+    for (const std::string& value :
+         splitAtCommas({text.substr(equals == std::string::npos ? 0 : equals + 1)}))
+      given.push_back({scalar, parseNumber("--iso", value)});
+  }
+  return given;
 }
 
 /// `of`: what has the colour, in the names of the options.
@@ -131,14 +148,41 @@ TriangleMesh meshFromFile(const std::filesystem::path& path) {
   return meshOf({std::move(surface.points), std::move(surface.triangles)});
 }
 
-void requireIsovalues(const SurfaceScene& scene, const CacheReader& cache, const SceneScalars& scalars) {
-  const auto& variable = scalars.iso_of_colours ? scalars.colours : scalars.opacities;
-  if (!variable) return;
-  const VariableInfo& info = cache.manifest().variables[*variable];
-  for (const double value : scene.isovalues)
-    if (!(value >= info.min && value <= info.max))
-      throw Error("--iso {}: no isosurface: the values of {} go from {:.6g} to {:.6g}", value, info.name,
-                  info.min, info.max);
+size_t isoVariable(const GivenIsovalue& given, const CacheReader& cache) {
+  try {
+    return cache.variableNamed(given.scalar);
+  } catch (const UsageError& error) {
+    throw Error("--iso {}={:g}: {}", given.scalar, given.value, error.what());
+  }
+}
+
+/// Puts the isosurfaces into the scene: those of the picture's scalar, and by scalar those of others.
+void addIsosurfaces(const SurfaceArguments& arguments, const CacheReader& cache, const SceneScalars& scalars,
+                    SurfaceScene& scene) {
+  const auto& own = scalars.opacities;
+  const std::vector<std::optional<glm::vec3>> colours = parseIsoColours(arguments);
+  const std::vector<GivenIsovalue> given = parseIsovalues(arguments);
+  for (size_t n = 0; n < given.size(); ++n) {
+    const double value = given[n].value;
+    const auto variable = given[n].scalar.empty() ? own : isoVariable(given[n], cache);
+    if (variable) {
+      const VariableInfo& info = cache.manifest().variables[*variable];
+      if (!(value >= info.min && value <= info.max))
+        throw Error("--iso {}: no isosurface: the values of {} go from {:.6g} to {:.6g}", value, info.name,
+                    info.min, info.max);
+    }
+    std::vector<double>* values = &scene.isovalues;
+    std::vector<std::optional<glm::vec3>>* of_values = &scene.iso_colours;
+    if (variable != own) {
+      auto further = std::ranges::find(scene.further_isosurfaces, *variable, &FurtherIsosurfaces::variable);
+      if (further == scene.further_isosurfaces.end())
+        further = scene.further_isosurfaces.insert(further, FurtherIsosurfaces{*variable});
+      values = &further->values;
+      of_values = &further->own_colours;
+    }
+    values->push_back(value);
+    if (!colours.empty()) of_values->push_back(colours[n]);
+  }
 }
 
 }  // namespace
@@ -188,11 +232,16 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->capture_default_str()
       ->group(group);
   command
-      .add_option(
-          "--iso", arguments.isovalues,
-          "Isosurfaces of the scalar at VALUE,VALUE,..., lit, in the transfer function's colours; repeatable")
+      .add_option("--iso", arguments.isovalues,
+                  "Isosurfaces of the scalar at VALUE,VALUE,..., lit, in the transfer function's colours; "
+                  "NAME=VALUE,... of another scalar, in the colours that --scalar has there; repeatable")
       ->take_all()
       ->allow_extra_args(false)
+      ->group(group);
+  command
+      .add_option("--iso-by", arguments.iso_by,
+                  "Scalar of the values of --iso that are given without a NAME (default: the --opacity-by "
+                  "scalar if given, otherwise --scalar)")
       ->group(group);
   command
       .add_option("--iso-colour", arguments.iso_colours,
@@ -205,7 +254,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       .add_option(
           "--iso-opacity", arguments.iso_opacity,
           "Opacity of the isosurfaces, above 0 and at most 1; function: by the transfer function (that of "
-          "--opacity-by, if given); function*NUMBER: NUMBER times that")
+          "--opacity-by, if given; not of a third scalar's); function*NUMBER: NUMBER times that")
       ->capture_default_str()
       ->group(group);
   command
@@ -235,7 +284,9 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
       std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile))
     throw UsageError("--surface-by {} needs faces of the grid, such as --surface kmin", arguments.surface_by);
   requireChoice("--volume", arguments.volume, {"on", "off"});
-  parseIsovalues(arguments.isovalues);
+  parseIsovalues(arguments);
+  if (!arguments.iso_by.empty() && arguments.isovalues.empty())
+    throw UsageError("--iso-by {}: needs an isosurface: --iso VALUE", arguments.iso_by);
   parseIsoColours(arguments);
   const SheetOpacity of_isosurfaces = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   if (!of_isosurfaces.opaque() && arguments.isovalues.empty())
@@ -246,6 +297,20 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
       arguments.isovalues.empty() && !arguments.curves.given() && !arguments.map.map &&
       !arguments.film_has_slices)
     throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface, an --iso or --lines");
+}
+
+std::vector<std::string> isoScalars(const SurfaceArguments& arguments) {
+  std::vector<std::string> scalars;
+  for (const GivenIsovalue& given : parseIsovalues(arguments)) scalars.push_back(given.scalar);
+  return scalars;
+}
+
+std::vector<AskedIsovalues> askedIsovalues(const SurfaceScene* scene, size_t opacities, size_t colours) {
+  std::vector<AskedIsovalues> asked;
+  if (!scene) return asked;
+  for (const IsoGroup& group : isoGroups(*scene, {opacities, colours}))
+    asked.push_back({group.variable, {group.values.begin(), group.values.end()}});
+  return asked;
 }
 
 bool isVtp(const std::filesystem::path& path) {
@@ -334,14 +399,11 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   const SheetOpacity of_slices = parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
   scene->slice_opacity = of_slices.factor;
   scene->slices_by_function = of_slices.by_function;
-  scene->isovalues = parseIsovalues(arguments.isovalues);
-  scene->iso_colours = parseIsoColours(arguments);
   scene->iso_opacity = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
-  scene->iso_of_colours = scalars.iso_of_colours;
   scene->volume = arguments.volume == "on";
   scene->curves = curvesOf(arguments.curves, cache, globe,
                            scalars.colours ? cache.manifest().variables[*scalars.colours].name : "");
-  requireIsovalues(*scene, cache, scalars);
+  addIsosurfaces(arguments, cache, scalars, *scene);
   return scene;
 }
 

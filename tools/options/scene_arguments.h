@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "render/annotate/annotations.h"
+#include "render/automatic/stored_steps.h"
 #include "render/colour/function_parts.h"
 #include "render/frame/frame_options.h"
 #include "render/surface/surface_scene.h"
@@ -36,6 +37,7 @@ struct SurfaceArguments {
   std::string slice_opacity = "1", volume = "on";
   std::string surface_by;
   std::vector<std::string> isovalues, iso_colours;
+  std::string iso_by;  // the scalar of values without a name; empty: the picture's
   std::string iso_opacity = "1";
   CurveArguments curves;
   MapArguments map;
@@ -56,6 +58,12 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
 /// picture has a scalar of its opacities, which surfaces may have as well.
 void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities = false);
 
+/// The scalars that --iso names; empty names stand for the picture's.
+std::vector<std::string> isoScalars(const SurfaceArguments& arguments);
+
+/// The isosurfaces of a scene, which may be null, of a picture whose opacities and colours are of these scalars.
+std::vector<AskedIsovalues> askedIsovalues(const SurfaceScene* scene, size_t opacities, size_t colours);
+
 /// Whether it is a .vtp file, by its extension.
 bool isVtp(const std::filesystem::path& path);
 
@@ -68,7 +76,6 @@ bool hasFaces(const SurfaceArguments& arguments);
 /// The variables of a picture.
 struct SceneScalars {
   std::optional<size_t> colours, opacities;  // none: of a window, which may show any
-  bool iso_of_colours = false;               // of two: isosurfaces are those of the colours
   bool opacity_by = false;         // whether the opacities are those of --opacity-by, also for faces
   DefaultMaps maps = kMapsOnDark;  // for faces that show another scalar
 

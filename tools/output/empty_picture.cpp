@@ -136,7 +136,7 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
 /// Why nothing is seen of a scene without the volume.
 std::string whyNoSheetIsVisible(const SurfaceScene& sheets, const VariableInfo& variable) {
   const bool is_only_iso = sheets.surfaces.empty() && sheets.grid_surfaces.empty() && sheets.slices.empty() &&
-                           !sheets.isovalues.empty();
+                           sheets.further_isosurfaces.empty() && !sheets.isovalues.empty();
   if (!is_only_iso)
     return "no surface, slice or isosurface is in sight, and --volume is off; try --view iso or another "
            "camera";

@@ -419,8 +419,8 @@ void FunctionPanel::drawUnit(EditedFunction& function, Result& result) {
   constexpr double kThinnest = 0.01, kDensest = 10'000;
   double density = usual / unit;
   label("strength");
-  if (ImGui::SliderScalar("##strength", ImGuiDataType_Double, &density, &kThinnest, &kDensest, "%.3g",
-                          ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##strength", density, kThinnest, kDensest, "%.3g",
+             ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
     constexpr int kDigits = 3;
     function.setOpacityUnit(roundedTo(usual / density, usual / density, kDigits));
     result.changed = true;

@@ -130,4 +130,35 @@ void hint(const char* text) {
   nameWidget(std::string("hint ") + text);
 }
 
+void drawFurther(const FurtherScalars& further, const WantedScalar& wanted, const std::string& prefix,
+                 PanelActions& actions) {
+  if (further.from.empty()) {
+    if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());
+    if (!further.note.empty()) nameWidget("note " + further.note);
+    return;
+  }
+  actions.looks_for_scalars = true;
+  ImGui::Separator();
+  const bool has_stored = std::ranges::any_of(further.scalars, [](const auto& one) { return !one.derived; });
+  if (further.is_looking || further.is_busy || has_stored)
+    ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
+                              : further.is_busy  ? "one is being added"
+                                                 : "more, added when chosen:");
+  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
+  ImGui::BeginDisabled(further.is_busy);
+  for (const bool derived : {false, true}) {
+    const auto is_one = [derived](const SourceScalar& one) { return one.derived == derived; };
+    if (derived && std::ranges::any_of(further.scalars, is_one)) ImGui::TextDisabled("computed when chosen:");
+    for (const SourceScalar& one : further.scalars) {
+      if (!is_one(one)) continue;
+      if (ImGui::Selectable(scalarTitle(one.name, one.unit).c_str())) {
+        actions.add_scalar = wanted;
+        actions.add_scalar->name = one.name;
+      }
+      nameWidget(prefix + one.name);
+    }
+  }
+  ImGui::EndDisabled();
+}
+
 }  // namespace curvisplat

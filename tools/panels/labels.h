@@ -32,7 +32,6 @@ struct PanelActions {
   std::vector<Command> commands;
   std::optional<StepPosition> time;                   // to go to
   std::optional<bool> interpolates;                   // between steps
-  std::optional<std::string> draw_isosurfaces_of;     // this scalar, by its opacities
   std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
   std::optional<std::string> add_faces;               // of the grid, by name
   std::string pointed_faces;                          // that the mouse points at in a list; empty: none
@@ -80,6 +79,10 @@ class Section {
  private:
   bool open_;
 };
+/// Draws the scalars that the sources have besides, at the end of a list of scalars. `wanted`: what one that is chosen is for; `prefix`: of the
+/// names of widgets.
+void drawFurther(const FurtherScalars& further, const WantedScalar& wanted, const std::string& prefix,
+                 PanelActions& actions);
 /// Shows a line under the widget that the mouse is over, after a moment.
 void hint(const char* text);
 

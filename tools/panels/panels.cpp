@@ -122,7 +122,7 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
   ImGui::EndDisabled();
   ImGui::SameLine(0.5f * ImGui::GetContentRegionMax().x);
   commandOption(Command::kPlaneFrames, actions, "frames of cuts", facts.shows_frames);
-  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, actions);
+  surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, facts.further, actions);
   if (!state.isosurfaces.empty()) drawFinerThanStored(state, facts);
   cuts_.draw(state, actions);
   std::optional<size_t> seen = state.markers.size();  // a click in the picture unfolds nothing
@@ -133,7 +133,7 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
 void Panels::drawTime(PanelActions& actions, Playback& playback) {
   label("steps per second");
   float speed = static_cast<float>(playback.stepsPerSecond());
-  if (ImGui::SliderFloat("##steps per second", &speed, 1, 60, "%.0f", ImGuiSliderFlags_AlwaysClamp))
+  if (slider("##steps per second", speed, 1, 60, "%.0f", ImGuiSliderFlags_AlwaysClamp))
     playback.setStepsPerSecond(speed);
   nameWidget("steps per second");
   bool loops = playback.loops();
@@ -156,35 +156,6 @@ void drawElsewhere(const std::vector<std::string>& names, PanelActions& actions)
   }
 }
 
-/// Draws the scalars that the sources have besides, at the end of a list of scalars.
-void drawFurther(const FurtherScalars& further, bool for_opacities, PanelActions& actions) {
-  if (further.from.empty()) {
-    if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());
-    if (!further.note.empty()) nameWidget("note " + further.note);
-    return;
-  }
-  actions.looks_for_scalars = true;
-  ImGui::Separator();
-  const bool has_stored = std::ranges::any_of(further.scalars, [](const auto& one) { return !one.derived; });
-  if (further.is_looking || further.is_busy || has_stored)
-    ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
-                              : further.is_busy  ? "one is being added"
-                                                 : "more, added when chosen:");
-  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
-  ImGui::BeginDisabled(further.is_busy);
-  for (const bool derived : {false, true}) {
-    const auto is_one = [derived](const SourceScalar& one) { return one.derived == derived; };
-    if (derived && std::ranges::any_of(further.scalars, is_one)) ImGui::TextDisabled("computed when chosen:");
-    for (const SourceScalar& one : further.scalars) {
-      if (!is_one(one)) continue;
-      if (ImGui::Selectable(scalarTitle(one.name, one.unit).c_str()))
-        actions.add_scalar = {one.name, for_opacities};
-      nameWidget((for_opacities ? "further opacity by " : "further scalar ") + one.name);
-    }
-  }
-  ImGui::EndDisabled();
-}
-
 }  // namespace
 
 void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions) {
@@ -198,7 +169,7 @@ void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelA
       if (chooses) actions.scalar = one.name;
     }
     if (facts.elsewhere) drawElsewhere(*facts.elsewhere, actions);
-    if (facts.further) drawFurther(*facts.further, false, actions);
+    if (facts.further) drawFurther(*facts.further, {}, "further scalar ", actions);
     ImGui::EndCombo();
   } else {
     nameWidget("scalar");
@@ -224,7 +195,7 @@ void Panels::drawOpacityScalars(const ViewState& state, const PanelFacts& facts,
       nameWidget("opacity by " + one.name);
       if (chooses) actions.opacity_scalar = one.name;
     }
-    if (has_further) drawFurther(*facts.further, true, actions);
+    if (has_further) drawFurther(*facts.further, {"", true}, "further opacity by ", actions);
     ImGui::EndCombo();
   } else {
     nameWidget("opacity by");
@@ -284,8 +255,8 @@ namespace {
 void drawLight(ViewState& state, PanelActions& actions) {
   const auto slide = [&](const char* name, double& value, double low, double high, const char* format) {
     label(name);
-    const bool slides = ImGui::SliderScalar(fmt::format("##{}", name).c_str(), ImGuiDataType_Double, &value,
-                                            &low, &high, format, ImGuiSliderFlags_AlwaysClamp);
+    const bool slides =
+        slider(fmt::format("##{}", name).c_str(), value, low, high, format, ImGuiSliderFlags_AlwaysClamp);
     actions.dragging |= isDragged();
     actions.changed |= slides;
     nameWidget(name);
@@ -353,7 +324,7 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
   const auto darkness = [&](const char* name, const char* id, double& value, const char* help) {
     auto shown = static_cast<float>(value);
     label(name);
-    if (ImGui::SliderFloat(id, &shown, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+    if (slider(id, shown, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
       value = static_cast<double>(shown);
       actions.changed = true;
     }
@@ -372,8 +343,8 @@ void drawVerticalScale(ViewState& state, const std::optional<Globe>& globe, Pane
   if (globe && globe->sphere()) return;
   auto factor = static_cast<float>(state.verticalScale(globe));
   label("vertical scale");
-  if (ImGui::SliderFloat("##vertical scale", &factor, 0.01f, 1000, "%.3g",
-                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##vertical scale", factor, 0.01f, 1000, "%.3g",
+             ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
     state.setVerticalScale(static_cast<double>(factor), globe);
     actions.changed = true;
   }
@@ -407,7 +378,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   float angle = static_cast<float>(state.camera.view_angle_deg);
   label("view angle");
   ImGui::BeginDisabled(!perspective);
-  if (ImGui::SliderFloat("##view angle", &angle, 10, 120, "%.0f°", ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##view angle", angle, 10, 120, "%.0f°", ImGuiSliderFlags_AlwaysClamp)) {
     state.camera.view_angle_deg = static_cast<double>(angle);
     actions.changed = true;
   }
@@ -464,8 +435,7 @@ void Panels::drawColour(ViewState& state, const PanelFacts& facts, PanelActions&
 void Panels::drawDetail(ViewState& state, PanelActions& actions) {
   float lod = static_cast<float>(state.lod_pixels);
   label("error, pixels");
-  if (ImGui::SliderFloat("##error", &lod, 0, 16, "%.2f",
-                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##error", lod, 0, 16, "%.2f", ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
     state.lod_pixels = static_cast<double>(lod);
     actions.changed = true;
   }
@@ -474,8 +444,8 @@ void Panels::drawDetail(ViewState& state, PanelActions& actions) {
   actions.dragging |= isDragged();
   int mebibytes = static_cast<int>(std::min<uint64_t>(state.memory_bytes >> 20, 1 << 30));
   label("memory, MiB");
-  if (ImGui::SliderInt("##memory", &mebibytes, 64, 65536, "%d",
-                       ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
+  if (slider("##memory", mebibytes, 64, 65536, "%d",
+             ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp))
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
   actions.changed |= ImGui::IsItemDeactivatedAfterEdit();
   nameWidget("memory, MiB");

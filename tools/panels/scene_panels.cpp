@@ -65,8 +65,7 @@ std::string coordinateFormat(double coordinate, double lowest, double highest) {
 void opacitySlider(const char* text, const std::string& name, double& opacity, PanelActions& actions) {
   auto value = static_cast<float>(opacity);
   label(text);
-  if (ImGui::SliderFloat(fmt::format("##{}", name).c_str(), &value, 0.05f, 1, "%.2f",
-                         ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider(fmt::format("##{}", name).c_str(), value, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
     opacity = static_cast<double>(value);
     actions.changed = true;
   }
@@ -240,15 +239,14 @@ void CutPanel::drawPlane(ListedPlane& plane, const std::string& name, const View
   const double lowest = centre - reach, highest = centre + reach;
   double place = glm::dot(scale.along, plane.point);
   label(scale.name);
-  if (ImGui::SliderScalar("##place", ImGuiDataType_Double, &place, &lowest, &highest,
-                          coordinateFormat(place, lowest, highest).c_str())) {
+  if (slider("##place", place, lowest, highest, coordinateFormat(place, lowest, highest).c_str(), 0)) {
     plane.point = middle + (place - centre) * scale.along;
     actions.changed = true;
   }
   actions.dragging |= isDragged();
   nameWidget(name);
   nameWidget(fmt::format("{}: {} at {:.3g}", name, scale.name, place));
-  hint("drag it here or in the picture; Ctrl + click to type a number");
+  hint("drag it here or in the picture; double click to type a number");
 }
 
 /// Draws the numbers of the plane's direction.
@@ -272,7 +270,7 @@ void CutPanel::drawNormal(ListedPlane& plane, const std::string& name, PanelActi
 void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
   auto opacity = static_cast<float>(state.slice_opacity.factor);
   label("opacity");
-  if (ImGui::SliderFloat("##opacity", &opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+  if (slider("##opacity", opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
     state.slice_opacity.factor = static_cast<double>(opacity);
     actions.changed = true;
   }
@@ -280,11 +278,12 @@ void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
   actions.changed |= opacityByFunction(state.slice_opacity.by_function, "slices by function");
 }
 
-void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions) {
+void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces,
+                        const FurtherScalars* further, PanelActions& actions) {
   if (const Section open{"Surfaces", surfaces_seen_, state.surfaces.size() + state.faces.size()})
     drawSurfaces(state, faces, actions);
   if (const Section open{"Isosurfaces", isosurfaces_seen_, state.isosurfaces.size()})
-    drawIsosurfaces(state, actions);
+    drawIsosurfaces(state, further, actions);
 }
 
 void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>& faces,
@@ -366,13 +365,11 @@ void SurfacePanel::drawColouring(const ViewState& state, PanelActions& actions) 
   ImGui::EndDisabled();
 }
 
-void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
+void SurfacePanel::drawIsosurfaces(ViewState& state, const FurtherScalars* further, PanelActions& actions) {
   commandButton(Command::kAddIsosurface, actions);
   ImGui::BeginDisabled(state.isosurfaces.empty());
   opacitySlider("opacity", "opacity of isosurfaces", state.iso_opacity.factor, actions);
-  ImGui::BeginDisabled(state.hasIsosurfacesOfThird());
   actions.changed |= opacityByFunction(state.iso_opacity.by_function, "isosurfaces by function");
-  ImGui::EndDisabled();
   ImGui::EndDisabled();
   size_t removed = state.isosurfaces.size();
   for (size_t n = 0; n < state.isosurfaces.size(); ++n) {
@@ -383,43 +380,31 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, PanelActions& actions) {
     actions.changed |= eye(one.visible, name);
     ImGui::SameLine();
     ImGui::SetNextItemWidth(removeFrom() - ImGui::GetStyle().ItemSpacing.x - ImGui::GetCursorPosX());
-    const std::optional<std::string> chosen = chooseScalarOf(one, name);
+    chooseScalarOf(n, one, further, actions);
     if (removeButton(name)) removed = n;
-    if (chosen) actions.isosurface_scalar = {n, *chosen};
     drawValueOf(one, name, actions);
     drawColourOf(one, name, state, actions);
-    if (one.visible && one.scalar != state.isoScalar()) {
-      ImGui::TextDisabled("not drawn: those of %s are", state.isoScalar().c_str());
-      nameWidget(name + " is not drawn");
-      ImGui::SameLine();
-      if (ImGui::SmallButton("Draw it")) actions.draw_isosurfaces_of = one.scalar;
-      nameWidget("draw " + name);
-      hint(
-          "One scalar's isosurfaces are drawn at a time: that of the opacities, or of the colours;\n"
-          "without the volume, any scalar's. This takes the volume's opacities from the scalar,\n"
-          "until its last isosurface is removed.");
-    }
     ImGui::PopID();
   }
   removeAt(state.isosurfaces, removed, actions);
 }
 
 /// Each has a scalar of its own, which need not be the one that the picture shows.
-std::optional<std::string> SurfacePanel::chooseScalarOf(const Isosurface& one,
-                                                        const std::string& name) const {
+void SurfacePanel::chooseScalarOf(size_t number, const Isosurface& one, const FurtherScalars* further,
+                                  PanelActions& actions) const {
+  const std::string name = fmt::format("isosurface {}", number + 1);
   if (!ImGui::BeginCombo("##scalar", one.scalar.c_str(), ImGuiComboFlags_HeightLarge)) {
     nameWidget("scalar of " + name);
-    return std::nullopt;
+    return;
   }
-  std::optional<std::string> chosen;
   for (const VariableInfo& info : cache_.manifest().variables) {
     const bool chooses =
         ImGui::Selectable(scalarTitle(info.name, info.unit).c_str(), info.name == one.scalar);
     nameWidget(fmt::format("{} by {}", name, info.name));
-    if (chooses && info.name != one.scalar) chosen = info.name;
+    if (chooses && info.name != one.scalar) actions.isosurface_scalar = {number, info.name};
   }
+  if (further) drawFurther(*further, {"", false, number}, name + " by further ", actions);
   ImGui::EndCombo();
-  return chosen;
 }
 
 void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions) {
@@ -429,13 +414,12 @@ void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelAc
   const double highest = info == all.end() ? one.value : info->max;
   label("value");
   ImGui::BeginDisabled(info == all.end());
-  if (ImGui::SliderScalar("##value", ImGuiDataType_Double, &one.value, &lowest, &highest, "%.5g",
-                          ImGuiSliderFlags_AlwaysClamp))
+  if (slider("##value", one.value, lowest, highest, "%.5g", ImGuiSliderFlags_AlwaysClamp))
     actions.changed = true;
   ImGui::EndDisabled();
   actions.dragging |= isDragged();
   nameWidget(name);
-  hint("Ctrl + click to type a number");
+  hint("double click to type a number");
 }
 
 /// Draws a colour of its own, or the function's, which choosing another one replaces.

@@ -40,14 +40,16 @@ ClipPlane planeBeforeViewer(const Manifest& manifest, const ViewState& state);
 class SurfacePanel {
  public:
   explicit SurfacePanel(const CacheReader& cache) : cache_(cache) {}
-  /// `faces`: names of faces that can be added.
-  void draw(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions);
+  /// `faces`: names of those that can be added. `further`: scalars besides the cache's; may be null.
+  void draw(ViewState& state, const std::vector<std::string>& faces, const FurtherScalars* further,
+            PanelActions& actions);
 
  private:
   void drawSurfaces(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions);
   void drawColouring(const ViewState& state, PanelActions& actions);
-  void drawIsosurfaces(ViewState& state, PanelActions& actions);
-  std::optional<std::string> chooseScalarOf(const Isosurface& one, const std::string& name) const;
+  void drawIsosurfaces(ViewState& state, const FurtherScalars* further, PanelActions& actions);
+  void chooseScalarOf(size_t number, const Isosurface& one, const FurtherScalars* further,
+                      PanelActions& actions) const;
   void drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions);
   static void drawColourOf(Isosurface& one, const std::string& name, const ViewState& state,
                            PanelActions& actions);

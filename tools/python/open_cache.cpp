@@ -49,7 +49,6 @@ OpacityArguments opacityArguments(const Options& function) {
   arguments.by.transfer_function = given(function, "opacity_tf");
   arguments.by.range = given(function, "opacity_range");
   arguments.by.asinh = given(function, "opacity_asinh");
-  arguments.iso_scalar = given(function, "iso_by").value_or("");
   return arguments;
 }
 
@@ -85,6 +84,7 @@ SurfaceArguments surfaceArguments(const Options& frame, const py::dict& others) 
   arguments.slices = of<Texts>(others, "slices");
   arguments.slice_opacity = of<std::string>(others, "slice_opacity");
   arguments.isovalues = of<Texts>(others, "isovalues");
+  arguments.iso_by = of<std::string>(others, "iso_by");
   arguments.iso_colours = of<Texts>(others, "iso_colour");
   if (others.contains("iso_opacity")) arguments.iso_opacity = of<std::string>(others, "iso_opacity");
   arguments.volume = of<bool>(others, "volume") ? "on" : "off";
@@ -275,7 +275,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
   const bool has_opacities = !arguments.opacity.by.scalar.empty();
   checkCameraArguments(arguments.camera);
   checkFunctionArguments(arguments.scalar);
-  checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
+  checkOpacityArguments(arguments.opacity, arguments.scalar);
   checkSurfaceArguments(arguments.surfaces, has_opacities);
   checkAnnotationArguments(arguments.annotations);
   DrawnPicture picture;
@@ -295,8 +295,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     const DrawnScalars& scalars = choice.scalars;
     const TransferFunction& function = scalars.opacity.function;
     frame.scene = sceneOf(arguments.surfaces, reader_,
-                          {shown, scalars.opacity.variable, isoOfColours(arguments.opacity, arguments.scalar),
-                           has_opacities, mapsOn(frame.background)});
+                          {shown, scalars.opacity.variable, has_opacities, mapsOn(frame.background)});
     const Annotations& annotations = arguments.annotations.shown;
     const std::vector<ShownFunction> functions = shownFunctions(
         arguments.annotations, scalars, manifest, frame.scene.get(), arguments.surfaces.surface_by);
@@ -320,11 +319,9 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
         arguments, image,
         {manifest, manifest.variables[scalars.opacity.variable], function, at, frame, picture.statistics});
     const TransferFunction& colours = scalars.colour ? scalars.colour->function : function;
-    const bool iso_of_colours = isoOfColours(arguments.opacity, arguments.scalar);
     for (std::string& finer :
          finerThanStored(reader_, {{{scalars.opacity.variable, function.axis()}, {shown, colours.axis()}},
-                                   iso_of_colours ? shown : scalars.opacity.variable,
-                                   arguments.surfaces.isovalues}))
+                                   askedIsovalues(frame.scene.get(), scalars.opacity.variable, shown)}))
       picture.warnings.push_back(std::move(finer));
     if (!(annotations == Annotations{})) {
       AnnotatedScene scene{size,

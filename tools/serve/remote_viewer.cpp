@@ -179,7 +179,7 @@ class RemoteViewer::Work {
                             std::max(1, view.size.height / reduction_)};
     const ImageSize data = dataSizeOf(state, reader.manifest(), picture);
     FrameRequest request{functions.scalars(reader, state), function_version_, state.camera,
-                         state.frameOptions(data)};
+                         state.frameOptions(data, reader.manifest())};
     screenViewOf(reader.manifest(), state.camera, request.options, data);  // refuses what cannot be drawn
     const PictureMemory memory = memoryFor(picture, state.annotations, limits_.memory_bytes);
     request.options.output_bytes = memory.bytes;

@@ -47,7 +47,11 @@ struct SourceScalar {
 /// A scalar that the shown cache lacks and the user has chosen.
 struct WantedScalar {
   std::string name;
-  bool for_opacities = false;  // of the scalar that is shown; else it is to be shown
+  bool for_opacities = false;                       // of the scalar that is shown
+  std::optional<size_t> isosurface = std::nullopt;  // for this one, by its place in the list
+
+  /// Whether it is to be shown itself.
+  bool isShown() const { return !for_opacities && !isosurface; }
 };
 
 /// The functions of conversion that the window needs. The functions run on threads of their own, except for

@@ -42,12 +42,6 @@ ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
 
 DrawnScalars ShownFunctions::scalars(const CacheReader& cache, const ViewState& state) const {
   const size_t shown = cache.variableNamed(state.variable);
-  if (state.hasIsosurfacesOfThird()) {
-    const size_t of_isosurfaces = cache.variableNamed(state.isoScalar());
-    const VariableInfo& info = cache.manifest().variables[of_isosurfaces];
-    const EditedFunction any(kMapsOnDark.sequential, info.min, info.max, state.function.opacityUnit());
-    return DrawnScalars(DrawnScalar{of_isosurfaces, any.function()}, DrawnScalar{shown, colours_});
-  }
   if (!opacities_) return DrawnScalars(shown, colours_);
   return DrawnScalars(DrawnScalar{cache.variableNamed(state.opacity_by->variable), *opacities_},
                       DrawnScalar{shown, colours_});

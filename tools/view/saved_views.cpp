@@ -273,17 +273,23 @@ std::string hexText(const glm::vec3& colour) {
   return fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b);
 }
 
-/// Adds options for the isosurfaces that are drawn.
-void addIsosurfaces(const ViewState& state, const SurfaceScene& scene, CommandLine& words) {
-  if (scene.isovalues.empty()) return;
-  words.add("--iso", fmt::format("{}", fmt::join(scene.isovalues, ",")));
+/// Adds options for the isosurfaces that are drawn: --iso once for each scalar.
+void addIsosurfaces(const ViewState& state, CommandLine& words) {
+  const std::vector<std::vector<Isosurface>> groups = state.drawnIsosurfaces();
   std::vector<std::string> colours;
-  for (size_t n = 0; n < scene.isovalues.size(); ++n)
-    colours.push_back(scene.isoColour(n) ? hexText(*scene.isoColour(n)) : "function");
+  for (const std::vector<Isosurface>& group : groups) {
+    std::vector<double> values;
+    for (const Isosurface& one : group) {
+      values.push_back(one.value);
+      colours.push_back(one.colour ? hexText(*one.colour) : "function");
+    }
+    const std::string& scalar = group.front().scalar;
+    words.add("--iso", fmt::format("{}{}{}", scalar == state.opacityScalar() ? "" : scalar,
+                                   scalar == state.opacityScalar() ? "" : "=", fmt::join(values, ",")));
+  }
   if (std::ranges::any_of(colours, [](const std::string& colour) { return colour != "function"; }))
     words.add("--iso-colour", fmt::format("{}", fmt::join(colours, ",")));
-  if (state.isoScalar() != state.opacityScalar()) words.add("--iso-by", state.isoScalar());
-  if (!scene.iso_opacity.opaque()) words.add("--iso-opacity", text(scene.iso_opacity));
+  if (!groups.empty() && !state.iso_opacity.opaque()) words.add("--iso-opacity", text(state.iso_opacity));
 }
 
 /// Adds options for surfaces, slices (but for a film's) and isosurfaces, except for those that are hidden.
@@ -300,13 +306,13 @@ void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {
   for (const std::string& colour : colours) words.add("--surface-colour", colour);
   addSurfaceOpacities(state, words);
   if (state.faces_by && !state.faceNames().faces.empty()) words.add("--surface-by", state.faces_by->variable);
-  const auto scene = state.frameOptions({1, 1}).scene;
-  if (!scene) return;
+  if (!state.hasSheets()) return;
+  const std::vector<ClipPlane> slices = visiblePlanes(state.slices);
   if (has_slices)
-    for (const ClipPlane& plane : scene->slices) words.add("--slice", text(plane));
-  const SheetOpacity of_slices{scene->slice_opacity, scene->slices_by_function};
-  if (!of_slices.opaque() && !scene->slices.empty()) words.add("--slice-opacity", text(of_slices));
-  addIsosurfaces(state, *scene, words);
+    for (const ClipPlane& plane : slices) words.add("--slice", text(plane));
+  if (!state.slice_opacity.opaque() && !slices.empty())
+    words.add("--slice-opacity", text(state.slice_opacity));
+  addIsosurfaces(state, words);
   if (!state.drawsVolume()) words.add("--volume", "off");
 }
 

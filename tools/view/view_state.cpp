@@ -160,8 +160,9 @@ void putSurfaces(Json& json, const ViewState& state) {
   json["slices"] = jsonOf(state.slices);
   json["slice_opacity"] = state.slice_opacity.factor;
   json["slices_by_function"] = state.slice_opacity.by_function;
-  json["isovalues"] = Json::array();  // those that are drawn, for readers of earlier versions
-  for (const Isosurface& one : state.drawnIsosurfaces()) json["isovalues"].push_back(one.value);
+  json["isovalues"] = Json::array();  // those of the opacities' scalar, for readers of earlier versions
+  for (const Isosurface& one : state.isosurfaces)
+    if (one.visible && one.scalar == state.opacityScalar()) json["isovalues"].push_back(one.value);
   json["isosurfaces"] = Json::array();
   for (const Isosurface& one : state.isosurfaces) {
     json["isosurfaces"].push_back(
@@ -223,6 +224,24 @@ double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
   return diagonal > 0 ? diagonal / 100 : 1;
 }
 
+/// Puts the isosurfaces of one scalar into a scene that has those of the opacities' scalar, the first, without a name.
+void putIsosurfaces(const std::vector<Isosurface>& group, const ViewState& state, const Manifest& manifest,
+                    SurfaceScene& scene) {
+  const VariableInfo* const variable = find(manifest, group.front().scalar);
+  if (!variable) return;
+  FurtherIsosurfaces put{static_cast<size_t>(variable - manifest.variables.data())};
+  for (const Isosurface& one : group) {
+    put.values.push_back(one.value);
+    put.own_colours.push_back(one.colour);
+  }
+  if (group.front().scalar != state.opacityScalar()) {
+    scene.further_isosurfaces.push_back(std::move(put));
+    return;
+  }
+  scene.isovalues = std::move(put.values);
+  scene.iso_colours = std::move(put.own_colours);
+}
+
 /// Hides isosurfaces of scalars that the cache lacks.
 void hideOthers(std::vector<Isosurface>& isosurfaces, const Manifest& manifest) {
   for (Isosurface& one : isosurfaces) one.visible &= find(manifest, one.scalar) != nullptr;
@@ -272,64 +291,44 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
 
 }  // namespace
 
-const std::string& ViewState::isoScalar() const {
-  const auto shows = [this](const std::string& scalar) {
-    return std::ranges::any_of(isosurfaces,
-                               [&](const Isosurface& one) { return one.visible && one.scalar == scalar; });
+std::vector<std::vector<Isosurface>> ViewState::drawnIsosurfaces() const {
+  std::vector<std::vector<Isosurface>> drawn;
+  const auto take = [&](bool of_opacities) {
+    for (const Isosurface& one : isosurfaces) {
+      if (!one.visible || (one.scalar == opacityScalar()) != of_opacities) continue;
+      const auto same = std::ranges::find_if(
+          drawn, [&](const std::vector<Isosurface>& group) { return group.front().scalar == one.scalar; });
+      if (same == drawn.end())
+        drawn.push_back({one});
+      else
+        same->push_back(one);
+    }
   };
-  if (shows(opacityScalar())) return opacityScalar();
-  if (opacity_by || shows(variable)) return variable;
-  const auto other = std::ranges::find(isosurfaces, true, &Isosurface::visible);
-  return volume || other == isosurfaces.end() ? variable : other->scalar;
-}
-
-std::vector<Isosurface> ViewState::drawnIsosurfaces() const {
-  std::vector<Isosurface> drawn;
-  for (const Isosurface& one : isosurfaces)
-    if (one.visible && one.scalar == isoScalar()) drawn.push_back(one);
+  take(true);
+  take(false);
   return drawn;
 }
 
 AskedDifferences ViewState::askedDifferences(const CacheReader& cache) const {
-  AskedDifferences asked{{{cache.variableNamed(variable), function.axis()}},
-                         cache.variableNamed(isoScalar())};
+  AskedDifferences asked{{{cache.variableNamed(variable), function.axis()}}};
   if (opacity_by && drawsVolume())
     asked.axes.push_back({cache.variableNamed(opacity_by->variable), opacity_by->function.axis()});
   if (faces_by && std::ranges::any_of(faces, &NamedFaces::visible))
     asked.axes.push_back({cache.variableNamed(faces_by->variable), faces_by->function.axis()});
-  for (const Isosurface& one : drawnIsosurfaces())
-    asked.isovalues.push_back(fmt::format("{:.6g}", one.value));
+  for (const std::vector<Isosurface>& group : drawnIsosurfaces()) {
+    AskedIsovalues& values = asked.isosurfaces.emplace_back();
+    values.variable = cache.variableNamed(group.front().scalar);
+    for (const Isosurface& one : group) values.values.push_back(one.value);
+  }
   return asked;
-}
-
-void ViewState::takeOpacitiesFor(const std::string& scalar) {
-  if (opacities_before)
-    opacities_before->drawn = scalar;
-  else
-    opacities_before = OpacitiesBefore{scalar, opacity_by};
-}
-
-bool ViewState::giveOpacitiesBack() {
-  const auto is_drawn = [this](const Isosurface& one) { return one.scalar == opacities_before->drawn; };
-  if (!opacities_before || std::ranges::any_of(isosurfaces, is_drawn)) return false;
-  opacity_by = std::move(opacities_before->opacity_by);
-  if (opacity_by && opacity_by->variable == variable) opacity_by.reset();
-  opacities_before.reset();
-  return true;
-}
-
-bool ViewState::hasIsosurfacesOfThird() const {
-  return isoScalar() != variable && isoScalar() != opacityScalar();
 }
 
 bool ViewState::hasSheets() const {
   const auto has_visible = [](const auto& list) {
     return std::ranges::any_of(list, [](const auto& one) { return one.visible; });
   };
-  const bool has_isosurfaces = std::ranges::any_of(isosurfaces, [this](const Isosurface& one) {
-    return one.visible && (!opacity_by || one.scalar == variable || one.scalar == opacity_by->variable);
-  });
-  return given || has_isosurfaces || has_visible(surfaces) || has_visible(faces) || has_visible(slices);
+  return given || has_visible(isosurfaces) || has_visible(surfaces) || has_visible(faces) ||
+         has_visible(slices);
 }
 
 SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
@@ -380,7 +379,7 @@ void ViewState::setVerticalScale(double factor, const std::optional<Globe>& glob
   camera = rescaled(camera, std::exchange(scale, to), to);
 }
 
-FrameOptions ViewState::frameOptions(ImageSize size) const {
+FrameOptions ViewState::frameOptions(ImageSize size, const Manifest& manifest) const {
   FrameOptions options;
   options.size = size;
   options.classification = classification;
@@ -432,15 +431,10 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     }
     scene->slices = visiblePlanes(slices);
     scene->slice_opacity = slice_opacity.factor;
-    for (const Isosurface& one : drawnIsosurfaces()) {
-      scene->isovalues.push_back(one.value);
-      scene->iso_colours.push_back(one.colour);
-    }
-    scene->iso_of_colours = opacity_by && isoScalar() == variable;
+    for (const std::vector<Isosurface>& group : drawnIsosurfaces())
+      putIsosurfaces(group, *this, manifest, *scene);
     scene->iso_opacity = iso_opacity;
-    // The picture's function has no opacities for a third scalar.
-    scene->slices_by_function = slice_opacity.by_function && !hasIsosurfacesOfThird();
-    scene->iso_opacity.by_function &= !hasIsosurfacesOfThird();
+    scene->slices_by_function = slice_opacity.by_function;
     scene->volume = volume;
     options.scene = std::move(scene);
   }
@@ -498,9 +492,6 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
 
 void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown) {
   if (state.opacity_by && !find(manifest, state.opacity_by->variable)) state.opacity_by.reset();
-  if (auto& before = state.opacities_before;
-      before && before->opacity_by && !find(manifest, before->opacity_by->variable))
-    before->opacity_by.reset();
   if (state.faces_by && !find(manifest, state.faces_by->variable)) state.faces_by.reset();
   hideOthers(state.isosurfaces, manifest);
   if (!find(manifest, state.variable)) chooseVariable(state, manifest, shown);
@@ -511,11 +502,6 @@ std::string toJson(const ViewState& state) {
   put(json, state.function);
   json["opacity_by"] = nullptr;
   if (state.opacity_by) put(json["opacity_by"], *state.opacity_by);
-  json["opacities_before"] = nullptr;
-  if (const auto& before = state.opacities_before) {
-    Json& kept = json["opacities_before"] = {{"drawn", before->drawn}, {"opacity_by", nullptr}};
-    if (before->opacity_by) put(kept["opacity_by"], *before->opacity_by);
-  }
   json["lod_pixels"] = state.lod_pixels;
   json["memory_bytes"] = state.memory_bytes;
   json["flat"] = state.classification == Classification::kFlat;
@@ -586,11 +572,6 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   const double unit = defaultOpacityUnit(manifest, factors);
   if (const auto opacity = fields.find("opacity_by"))
     state.opacity_by = opacityScalarFrom(*opacity, path, manifest, unit);
-  if (const auto before = fields.find("opacities_before")) {
-    state.opacities_before = OpacitiesBefore{before->at("drawn").text()};
-    if (const auto opacity = before->find("opacity_by"))
-      state.opacities_before->opacity_by = opacityScalarFrom(*opacity, path, manifest, unit);
-  }
   takeSurfaces(fields, path, manifest, state);
   if (const auto markers = fields.find("markers"))
     for (const JsonField& marker : markers->elements(kMaxMarkers))

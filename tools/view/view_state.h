@@ -92,12 +92,6 @@ struct GivenSheets {
       std::nullopt;  // data around the Earth, which the first view looks down at
 };
 
-/// Keeps what gave the volume its opacities before it took those of a scalar whose isosurfaces were to be drawn.
-struct OpacitiesBefore {
-  std::string drawn;  // that scalar
-  std::optional<OpacityScalar> opacity_by = std::nullopt;
-};
-
 struct ViewState {
   static constexpr double kLightStrength = 0.7;
   static constexpr uint64_t kMemoryBytes = 512 << 20;
@@ -128,7 +122,6 @@ struct ViewState {
   Annotations annotations{.scalar_bar = true, .axes = true};
   std::string title = {};  // above the data, as it is; set by setTitle()
   std::optional<OpacityScalar> opacity_by = std::nullopt;
-  std::optional<OpacitiesBefore> opacities_before = std::nullopt;
   std::vector<Marker> markers = {};
   std::shared_ptr<const GivenSheets> given = nullptr;
 
@@ -139,18 +132,8 @@ struct ViewState {
   /// Suits all functions to the background (EditedFunction::suitBackground()).
   void suitBackground();
   const std::string& opacityScalar() const { return opacity_by ? opacity_by->variable : variable; }
-  /// The scalar whose isosurfaces are drawn: that of the opacities if there are any of it, otherwise that of the colours.
-  /// Without the volume, another one where it alone has isosurfaces.
-  const std::string& isoScalar() const;
-  /// The isosurfaces that are drawn, all of isoScalar().
-  std::vector<Isosurface> drawnIsosurfaces() const;
-  /// Keeps the present opacities for giveOpacitiesBack(), before those of `scalar` take their place so that its isosurfaces are drawn.
-  void takeOpacitiesFor(const std::string& scalar);
-  /// Gives the volume the opacities again that it had before, once no isosurface of that scalar is left, hidden or not. Returns
-  /// whether it did.
-  bool giveOpacitiesBack();
-  /// Whether the isosurfaces are of a scalar that gives neither colours nor opacities.
-  bool hasIsosurfacesOfThird() const;
+  /// The isosurfaces that are drawn, by scalar: those of the opacities' scalar first.
+  std::vector<std::vector<Isosurface>> drawnIsosurfaces() const;
   /// Whether anything but the volume is drawn, or would be without it.
   bool hasSheets() const;
   /// Whether the volume is drawn: always if there is nothing else, whatever `volume` says.
@@ -169,7 +152,7 @@ struct ViewState {
   /// The differences of scalars that its functions and isosurfaces ask for, of a cache that has them.
   AskedDifferences askedDifferences(const CacheReader& cache) const;
   /// The options of a frame whose grid surfaces have their look; their faces are found by faceNames().
-  FrameOptions frameOptions(ImageSize size) const;
+  FrameOptions frameOptions(ImageSize size, const Manifest& manifest) const;
 };
 
 /// Returns those that are not hidden.

@@ -343,11 +343,6 @@ void CacheView::react(const WindowLayout& layout) {
   if (layout.shows_panels) actions = drawPanels(layout);
   if (isSeries()) drawTimeBar(cache_, playback_, layout.time, actions);
   reports_.attempt([&] { apply(actions); });
-  if (state_.giveOpacitiesBack()) {
-    chooser_.drop(FunctionChooser::For::kOpacities);
-    ++function_version_;
-    changed_ = true;
-  }
   reports_.attempt([&] { film_.follow(state_.scale); });  // which panels and saved views may have changed
   if (isShown()) changed_ |= playback_.tick(clockSeconds());
   if (isShown() && film_.tick(clockSeconds()))
@@ -386,7 +381,6 @@ void CacheView::apply(const PanelActions& actions) {
   for (const Command command : actions.commands) run(command);
   if (actions.scalar) chooseScalar(*actions.scalar);
   if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
-  if (actions.draw_isosurfaces_of) drawIsosurfacesOf(*actions.draw_isosurfaces_of);
   if (actions.automatic_function) run(Command::kResetFunction);
   if (actions.automatic_opacities)
     chooser_.ask(
@@ -424,7 +418,7 @@ void CacheView::ask(bool moving, bool only_final) {
   const ViewState& drawn = pointed_faces_.empty() ? state_ : state_.withTinted(pointed_faces_);
   const ShownFunctions functions(state_, manifest());
   FrameRequest request{functions.scalars(cache_, state_), function_version_, state_.camera,
-                       drawn.frameOptions(data_size_)};
+                       drawn.frameOptions(data_size_, manifest())};
   request.moving = moving;
   request.only_final = only_final;
   request.step = playback_.step();
@@ -493,7 +487,7 @@ std::optional<WantedScalar> CacheView::takeWantedScalar(bool is_busy) {
   const auto is_wanted = [&](const VariableInfo& one) { return one.name == wanted->name; };
   if (!wanted || std::ranges::none_of(manifest().variables, is_wanted)) return wanted;
   reports_.attempt([&] {  // it has been added meanwhile
-    wanted->for_opacities ? chooseOpacityScalar(wanted->name) : chooseScalar(wanted->name);
+    wanted->isShown() ? chooseScalar(wanted->name) : useScalar(*wanted);
   });
   return std::nullopt;
 }

@@ -78,6 +78,8 @@ class CacheView {
   void showScalar(const std::string& name);
   /// An empty name: the opacities are of the same scalar.
   void chooseOpacityScalar(const std::string& name);
+  /// Takes a scalar that was added for the opacities or an isosurface; says if the cache that is shown does not have it.
+  void useScalar(const WantedScalar& wanted);
   void use(const FileDialog::Chosen& chosen);
   void addTo(MenuFacts& facts);
   bool isEnabled(Command command) const;
@@ -132,7 +134,6 @@ class CacheView {
   void readSurface(const std::filesystem::path& file);
   void takeSurface();
   void colourFaces(const std::string& scalar);
-  void drawIsosurfacesOf(const std::string& scalar);
   void findIsosurface(const std::string& scalar, std::optional<size_t> replaced = {});
   void takeIsosurfaces();
   void saveMovieTo(const std::filesystem::path& file, ImageSize size,

@@ -457,7 +457,6 @@ void CacheView::showScalar(const std::string& name) {
 
 void CacheView::chooseOpacityScalar(const std::string& name) {
   using For = FunctionChooser::For;
-  state_.opacities_before.reset();
   const std::string& shown = state_.opacityScalar();
   const bool is_shown = (name.empty() ? state_.variable : name) == shown;
   if (!is_shown && !name.empty() && name != state_.variable) return chooser_.ask({For::kOpacities, name});
@@ -468,12 +467,13 @@ void CacheView::chooseOpacityScalar(const std::string& name) {
   changed_ = true;
 }
 
-/// Gives the volume the opacities of the scalar, whose isosurfaces are drawn then.
-void CacheView::drawIsosurfacesOf(const std::string& scalar) {
-  state_.takeOpacitiesFor(scalar);
-  const auto before = state_.opacities_before;
-  chooseOpacityScalar(scalar == state_.variable ? "" : scalar);
-  state_.opacities_before = before;
+void CacheView::useScalar(const WantedScalar& wanted) {
+  if (std::ranges::find(manifest().variables, wanted.name, &VariableInfo::name) == manifest().variables.end())
+    return say(
+        fmt::format("{} has values at other samples: it is drawn by itself, as the scalar.", wanted.name));
+  if (wanted.for_opacities) return chooseOpacityScalar(wanted.name);
+  const size_t number = wanted.isosurface.value_or(state_.isosurfaces.size());
+  if (number < state_.isosurfaces.size()) findIsosurface(wanted.name, number);
 }
 
 void CacheView::addFaces(const std::string& name) {

@@ -115,7 +115,8 @@ class MovieFrames {
 
   void setOptions(uint64_t step) {
     const uint64_t memory_bytes = options_.memory_bytes;  // drawWithEnough() may have taken more
-    options_ = state_.frameOptions(dataSizeOf(state_, movie_.cache.manifest(), size_));
+    options_ =
+        state_.frameOptions(dataSizeOf(state_, movie_.cache.manifest(), size_), movie_.cache.manifest());
     options_.scene = sceneAtTime(options_.scene, player_->time());
     options_.memory_bytes = memory_bytes;
     options_.keep_going = movie_.keep_going;

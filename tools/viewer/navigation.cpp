@@ -147,6 +147,7 @@ bool Navigation::isMoving() const {
 }
 
 bool Navigation::update(Window& window, Camera& camera, ImageSize size) {
+  flies_ = flies_ && camera.projection == Projection::kPerspective;  // another camera may have been chosen
   const bool moved = drag(window, camera, size) | (flies_ && fly(window, camera));
   if (moved) moved_at_s_ = ImGui::GetTime();
   return moved;
@@ -220,7 +221,6 @@ bool Navigation::run(Command command, Camera& camera, ImageSize size) {
       return true;
     case Command::kOtherProjection:
       camera = withOtherProjection(camera);
-      flies_ = flies_ && camera.projection == Projection::kPerspective;
       return true;
     case Command::kFly:
       flies_ = !flies_;

@@ -45,15 +45,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kMaxTitle = 60;
-constexpr std::string_view kLacksValues = "have no value of";  // of an error of preprocess/addition
-
-/// The command that makes a cache of all scalars and one that is computed.
-std::string conversionWith(const std::string& scalar, const std::vector<fs::path>& files) {
-  std::string command = "curvisplat convert";
-  for (const fs::path& file : files) command += " " + shellWord(shortPath(file).string());
-  const std::string cache = fmt::format("{}_{}.splats", files.front().stem().string(), scalar);
-  return command + " -o " + shellWord(cache) + " --scalar " + shellWord("all," + scalar);
-}
 
 }  // namespace
 
@@ -159,7 +150,7 @@ void OpenedView::add(const WantedScalar& wanted) {
   adds_to_ = wanted;
   preparation_ =
       std::make_shared<Preparation>(Preparation{viewOptions(), surroundings_.picture_size(), nullptr});
-  preparation_->options.scalar = wanted.for_opacities ? view_->scalar() : scalar;
+  preparation_->options.scalar = wanted.isShown() ? scalar : view_->scalar();
   preparation_->options.preview = view_->preview();
   const bool is_there = view_->hasElsewhere(scalar);
   opening_ = std::make_unique<Opening>(
@@ -210,11 +201,11 @@ void OpenedView::takeWhole() {
     if (adds_to_) {
       options.grid_files = view_->gridFiles();
       options.carried = view_->carriedTo(*preparation->prepared);
-      if (!adds_to_->for_opacities) options.scalar = adds_to_->name;
+      if (adds_to_->isShown()) options.scalar = adds_to_->name;
       options.preview = view_->preview();
       show(*preparation->prepared, options,
            options.grid_files.empty() ? std::vector{cache} : options.grid_files);
-      if (adds_to_->for_opacities) view_->chooseOpacityScalar(adds_to_->name);
+      if (!adds_to_->isShown()) view_->useScalar(*adds_to_);
       return;
     }
     const bool is_kept = opening_files_.size() > 1 || opening_files_.front() != cache;
@@ -228,15 +219,7 @@ void OpenedView::takeWhole() {
     show(*preparation->prepared, options, opening_files_);
   } catch (const Interrupted&) {
   } catch (const Error& error) {
-    const std::string text = error.what();
-    if (!adds_to_ || !view_ || text.find(kLacksValues) == text.npos)
-      return surroundings_.reports.report(error, About::kOpening);
-    surroundings_.reports.report(
-        fmt::format(
-            "{0} cannot be added: not all samples have it. A terminal makes a cache with it, to be opened "
-            "here: {1}",
-            adds_to_->name, conversionWith(adds_to_->name, view_->sources())),
-        About::kOpening);
+    surroundings_.reports.report(error, About::kOpening);
   } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
     surroundings_.reports.report(error, About::kOpening);
   }

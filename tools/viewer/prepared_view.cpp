@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "render/annotate/globe_box.h"
+#include "render/surface/iso_groups.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "tools/view/first_view.h"
@@ -31,8 +32,10 @@ void takeScene(const ViewerOptions& options, const CacheReader& cache, ViewState
   if (!options.faces_by.empty())
     state.faces_by = FacesScalar{options.faces_by, automaticFunction(cache, options.faces_by)};
   state.isosurfaces.clear();
-  for (size_t n = 0; n < scene.isovalues.size(); ++n)
-    state.isosurfaces.push_back({state.opacityScalar(), scene.isovalues[n], true, scene.isoColour(n)});
+  for (const IsoGroup& group : isoGroups(scene, {cache.variableNamed(state.opacityScalar())}))
+    for (size_t n = 0; n < group.values.size(); ++n)
+      state.isosurfaces.push_back(
+          {cache.manifest().variables[group.variable].name, group.values[n], true, group.ownColour(n)});
   state.iso_opacity = scene.iso_opacity;
   state.slices.clear();
   for (const ClipPlane& plane : scene.slices) state.slices.push_back({plane});

@@ -128,6 +128,43 @@ bool isDragged() {
   return ImGui::IsItemActive() && !ImGui::GetIO().WantTextInput;
 }
 
+namespace {
+
+/// Dear ImGui opens sliders for typing where Ctrl is down, and fields that are dragged by a double click, too.
+template <typename T>
+bool typedSlider(const char* label, ImGuiDataType type, T& value, const T ends[2], const char* format,
+                 int flags) {
+  static std::pair<ImGuiID, T> pressed;  // the slider that was clicked last, and its value then
+  ImGuiIO& io = ImGui::GetIO();
+  const ImGuiID id = ImGui::GetID(label);
+  const bool clicked = GImGui->HoveredIdPreviousFrame == id && io.MouseClicked[0];
+  const bool again = clicked && io.MouseDoubleClicked[0] && pressed.first == id;
+  const bool restored = again && value != pressed.second;
+  if (again)
+    value = pressed.second;
+  else if (clicked)
+    pressed = {id, value};
+  const bool held = std::exchange(io.KeyCtrl, io.KeyCtrl || again);
+  const bool changed = ImGui::SliderScalar(label, type, &value, &ends[0], &ends[1], format, flags);
+  io.KeyCtrl = held;
+  return changed || restored;
+}
+
+}  // namespace
+
+bool slider(const char* label, float& value, float lowest, float highest, const char* format, int flags) {
+  const float ends[2] = {lowest, highest};
+  return typedSlider(label, ImGuiDataType_Float, value, ends, format, flags);
+}
+bool slider(const char* label, double& value, double lowest, double highest, const char* format, int flags) {
+  const double ends[2] = {lowest, highest};
+  return typedSlider(label, ImGuiDataType_Double, value, ends, format, flags);
+}
+bool slider(const char* label, int& value, int lowest, int highest, const char* format, int flags) {
+  const int ends[2] = {lowest, highest};
+  return typedSlider(label, ImGuiDataType_S32, value, ends, format, flags);
+}
+
 bool dragEnds(const char* label, float& low, float& high, const DraggedEnds& ends) {
   const bool changed = drawBeside(label, 2, [&](size_t n) {
     return n == 0 ? ImGui::DragFloat("", &low, ends.speed, ends.lowest, std::min(ends.highest, high),

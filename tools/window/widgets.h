@@ -49,6 +49,12 @@ struct DraggedEnds {
   float speed, lowest, highest;
   const char *low_format, *high_format;
 };
+/// Draws a slider from `lowest` to `highest`. Ctrl and a click, or a double click, open it for typing; what the first of two clicks has changed
+/// is changed back. Returns whether the value has changed. `label` is Dear ImGui's, `format` printf's, `flags` ImGuiSliderFlags.
+bool slider(const char* label, float& value, float lowest, float highest, const char* format, int flags);
+bool slider(const char* label, double& value, double lowest, double highest, const char* format, int flags);
+bool slider(const char* label, int& value, int lowest, int highest, const char* format, int flags);
+
 /// Draws two numbers beside each other that are dragged or typed, the first at most the second. Returns whether one has
 /// changed. `label` is Dear ImGui's, and begins with ##.
 bool dragEnds(const char* label, float& low, float& high, const DraggedEnds& ends);

@@ -102,6 +102,13 @@ def _numbers(values: Sequence[float]) -> str:
     return ",".join(_number(value) for value in values)
 
 
+def _isovalues(value: Any) -> Sequence[str]:
+    """Options of --iso: one for each value, or for each scalar of a dict."""
+    if isinstance(value, Mapping):
+        return [f"{name}={_numbers(_arguments.several(of_it, (int, float)))}" for name, of_it in value.items()]
+    return [_number(one) for one in _arguments.several(value, (int, float))]
+
+
 def _text(value: Any) -> str:
     """A value as the command line writes it: numbers joined by commas, text as it is."""
     if isinstance(value, str):
@@ -353,7 +360,7 @@ class Cache:
                clip_planes: Sequence[Vector] = (), step: Optional[int] = None, time: Optional[float] = None,
                interpolate: bool = False, surfaces: Union[str, Sequence[str]] = (), surface_colours: Union[str, Sequence[str]] = (),
                surface_by: str = "", surface_opacity: Union[float, str, Sequence[Union[float, str]]] = (), slices: Sequence[Vector] = (),
-               slice_opacity: Union[float, str] = 1, isovalues: Sequence[float] = (),
+               slice_opacity: Union[float, str] = 1, isovalues: Union[float, Sequence[float], Mapping[str, Union[float, Sequence[float]]]] = (),
                iso_opacity: Union[float, str, None] = None, iso_by: str = "", iso_colour: Union[str, Sequence[str]] = (),
                volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
                light_direction: Optional[Vector] = None, shadow: Optional[float] = None, ambient_occlusion: Optional[float] = None,
@@ -412,7 +419,7 @@ class Cache:
 
         look_at: (longitude, latitude), from_height: kilometres; a camera above that place.
 
-        isovalues: of the scalar, or of iso_by; iso_colour: "#rrggbb" or "function", of all or of each. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
+        isovalues: of the scalar, or of iso_by; or of several scalars, {"p": 1.5, "T": [300, 400]}; iso_colour: "#rrggbb" or "function", of all or of each. slice_opacity, iso_opacity: 0 to 1, or "function" for that of the transfer
         function.
 
         volume: False leaves the volume out. background: "dark" (#15171c), "white", another colour, or "transparent"; colours that are chosen suit it.
@@ -439,7 +446,7 @@ class Cache:
         of_camera |= {name: value for name, value in (("azimuth", azimuth), ("elevation", elevation), ("roll", roll), ("zoom", zoom))
                       if value is not None}
         of_two = _given(opacity_by=opacity_by or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh,
-                        opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf), iso_by=iso_by or None)
+                        opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf))
         frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
                        scale=scale, vertical_scale=vertical_scale, memory=str(memory), card_memory=None if card_memory is None else str(card_memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction, shadow=shadow, ambient_occlusion=ambient_occlusion,
@@ -461,7 +468,7 @@ class Cache:
                   "lines_colour": _arguments.several(lines_colour), "lines_by": lines_by, "line_width": _text(line_width),
                   "point_size": _text(point_size), "lines_opacity": _text(lines_opacity),
                   "slices": _arguments.planes("slices", slices, _numbers), "slice_opacity": _text(slice_opacity),
-                  "isovalues": [_number(value) for value in _arguments.several(isovalues, (int, float))],
+                  "isovalues": _isovalues(isovalues), "iso_by": iso_by,
                   "iso_colour": _arguments.several(iso_colour),
                   "volume": _arguments.flag("volume", volume), "shade": _arguments.flag("shade", shade),
                   "threads": _arguments.whole("threads", threads),
