@@ -72,18 +72,40 @@ class Numbering {
   std::vector<uint64_t> first_;
 };
 
-/// The values of a scalar, where halves meet and in some rows.
-struct ScalarExtent {
-  double least = std::numeric_limits<double>::infinity(), most = -std::numeric_limits<double>::infinity();
+/// The values of a scalar: their range, where halves meet and in some rows, and from these rows their median and spread.
+class ScalarExtent {
+ public:
   void add(double value) {
     if (!std::isfinite(value)) return;
-    least = std::min(least, value);
-    most = std::max(most, value);
+    least_ = std::min(least_, value);
+    most_ = std::max(most_, value);
   }
-  /// Values further apart than this differ.
-  double leastDifference() const {
-    return std::max(kWallShare * (most - least), kRounding * std::max(std::abs(least), std::abs(most)));
+  void addToSample(double value) {
+    add(value);
+    if (std::isfinite(value)) sample_.push_back(value);
   }
+  /// Call it once, after all values.
+  void finish() {
+    if (sample_.empty()) return;
+    std::sort(sample_.begin(), sample_.end());
+    const auto at = [&](double share) {
+      return sample_[static_cast<size_t>(share * static_cast<double>(sample_.size() - 1))];
+    };
+    median_ = at(0.5);
+    spread_ = at(1 - kTail) - at(kTail);
+    sample_ = {};
+  }
+  bool differ(double a, double b) const {
+    const double scale = spread_ + std::max(std::abs(a - median_), std::abs(b - median_));
+    return std::abs(a - b) > std::max({kWallShare * scale, kNoise * (most_ - least_),
+                                       kRounding * std::max(std::abs(least_), std::abs(most_))});
+  }
+
+ private:
+  static constexpr double kTail = 0.05, kNoise = 1e-4;
+  double least_ = std::numeric_limits<double>::infinity(), most_ = -std::numeric_limits<double>::infinity();
+  double median_ = 0, spread_ = 0;
+  std::vector<double> sample_;
 };
 
 class WallSearch {
@@ -177,7 +199,7 @@ class WallSearch {
   /// Adds the values of some rows to the extents: where halves meet, a scalar may be nearly even, and its noise
   /// would be most of its range there.
   void sampleRows() {
-    constexpr uint64_t kRows = 8, kMaxRows = 1024, kAcross = 3;
+    constexpr uint64_t kRows = 8, kMaxRows = 1024, kAcross = 3, kMaxOfRow = 256;
     const std::vector<GridBlock>& blocks = grid_.description().blocks;
     for (size_t block = 0; block < blocks.size(); block += blocks.size() * kRows / kMaxRows + 1)
       for (uint64_t row = 0; row < kRows; ++row) {
@@ -187,15 +209,16 @@ class WallSearch {
         const NodeBox box{j, j + 1, k, k + 1, 0, std::min(ni, kMaxBoxNodes)};
         readBox(grid_, static_cast<uint32_t>(block), box, scalars_, nodes_);
         for (size_t n = 0; n < scalars_.size(); ++n)
-          for (size_t at = 0; at < nodes_.blank.size(); ++at)
-            if (!nodes_.blank[at]) extents_[n].add(static_cast<double>(nodes_.scalars[n][at]));
+          for (size_t at = 0; at < nodes_.blank.size(); at += nodes_.blank.size() / kMaxOfRow + 1)
+            if (!nodes_.blank[at]) extents_[n].addToSample(static_cast<double>(nodes_.scalars[n][at]));
       }
+    for (ScalarExtent& extent : extents_) extent.finish();
   }
 
   /// Whether two records of a set have other values.
   bool differ(const double* a, const double* b) const {
     for (size_t n = 0; n < scalars_.size(); ++n)
-      if (std::abs(a[kKeySize + n] - b[kKeySize + n]) > extents_[n].leastDifference()) return true;
+      if (extents_[n].differ(a[kKeySize + n], b[kKeySize + n])) return true;
     return false;
   }
 

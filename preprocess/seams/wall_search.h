@@ -21,9 +21,10 @@
 
 namespace curvisplat {
 
-/// Values at one position differ if they are further apart than this share of the scalar's range, over all positions
-/// where halves meet and a sample of the grid's rows. A delta wing's values are up to 0.7 apart on the wing, and from 0.02 on at its trailing edge; those of its
-/// wake 7e-5 at most.
+/// Values at one position differ if they are further apart than this share of their own scale: the scalar's spread, from 5
+/// to 95 % of a sample of the grid's rows, and the distance from its median (DESIGN.md, "Long tails": a derived scalar's
+/// range says nothing). A delta wing's values are up to 0.7 of the range apart on the wing, and from 0.02 on at its trailing
+/// edge; those of its wake 7e-5 at most, and less than 1e-4 of the range is noise.
 inline constexpr double kWallShare = 0.01;
 
 struct WallSearchMemory {

@@ -192,6 +192,19 @@ TEST_F(ThinWallsTest, SmallDifferencesAreThoseOfACut) {
   EXPECT_EQ(convertTo("a.splats", noisy, {0}).merged_nodes, kNose * kNk);
 }
 
+/// A scalar whose range is that of a few nodes, 10,000 times as wide as its values elsewhere.
+TEST_F(ThinWallsTest, LongTailsHideNoWalls) {
+  const auto tail = [](double noise) {
+    return FunctionGridSource({gridBlock(kNi, kNj, kNk)}, 1, [noise](const GridNode& n) {
+      const bool is_nose = n.i == kNose && n.j == 0 && n.k == 0;
+      const double wake = n.i > kNose + kPlate ? noise : 0;
+      return NodeValues{placeAt(n), {static_cast<float>(is_nose ? 1e3 : pressure(xiOf(n)) + wake)}};
+    });
+  };
+  // The noise of the wake is a hundredth of the values' spread, and less than 1e-4 of their range.
+  EXPECT_EQ(convertTo("a.splats", tail(0.01), {0}).merged_nodes, kWakePairs * kNk);
+}
+
 TEST_F(ThinWallsTest, BlocksThatMeetAtAPlateStayApartThere) {
   const ConvertReport one = convertTo("a.splats", plate(), {1}),
                       two = convertTo("b.splats", plateOfTwoBlocks(), {1});
