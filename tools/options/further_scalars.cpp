@@ -26,6 +26,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_update.h"
 #include "stream/cache/faces_file.h"
+#include "stream/model/thin_walls.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/kept_conversion.h"
 #include "tools/options/point_values.h"
@@ -51,8 +52,10 @@ SeriesOptions optionsLike(const CacheReader& cache, const fs::path& output) {
 
 /// Whether two steps agree in all that other options would have changed.
 bool isSameStep(const Manifest& a, const Manifest& b) {
-  return a.nodes == b.nodes && a.blanked_nodes == b.blanked_nodes && a.splats == b.splats &&
-         a.cells == b.cells && a.lower == b.lower && a.upper == b.upper;
+  // Earlier programs merged the sides of thin walls.
+  const bool has_same_splats = a.splats == b.splats || a.hasFeature(kThinWalls) != b.hasFeature(kThinWalls);
+  return a.nodes == b.nodes && a.blanked_nodes == b.blanked_nodes && has_same_splats && a.cells == b.cells &&
+         a.lower == b.lower && a.upper == b.upper;
 }
 
 [[noreturn]] void refuse(const CacheReader& cache, const std::string& name) {
