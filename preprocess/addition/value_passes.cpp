@@ -68,7 +68,7 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
   openFile();
   seams_ = std::make_unique<SeamMerger>(variables_, plan_.seam_bytes, scratch_,
                                         unlikeHalvesOf(cache_->manifest()));
-  grid_ = &reader.source();
+  reader_ = &reader;
 
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
   std::optional<BlockOwners> owners;
@@ -86,18 +86,23 @@ void ValuePasses::scatter(const NodeReader& reader, std::function<void(const Loa
 void ValuePasses::mergeSeams() {
   if (seams_) seams_->sendToFirst(*ranks_);
   if (seams_ && ranks_->isFirst()) {
+    const GridDescription& grid = reader_->source().description();
+    const std::vector<GridBlock>& blocks = grid.blocks;
     const ThinWalls walls = thinWallsOf(*cache_);
+    // Of a series the second step tells.
     const std::vector<WallSide> of_values =
-        findThinWalls(*seams_, *grid_, {plan_.slab_bytes, scratch_}, *progress_);
-    if (const uint64_t missing = countMissing(of_values, grid_->description().blocks, walls); missing > 0)
+        cache_->series().steps.size() > 1
+            ? std::vector<WallSide>{}
+            : findThinWalls(*seams_, *reader_, {plan_.slab_bytes, scratch_}, *progress_).boxes;
+    if (const uint64_t missing = countMissing(of_values, blocks, walls); missing > 0)
       warning_of_walls_ = fmt::format(
           "at {} of nodes on both sides of thin walls the values are means of both sides: the cache has one "
-          "splat for each pair, since no values differed there when it was made; convert again, beginning "
-          "with a step in which they do",
+          "splat for each pair, since no values differed there when it was made, or an earlier program made "
+          "it; convert the grid again, with values that differ in the first step",
           countText(missing, "pair"));
     seams_->keepApart(walls);
     tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
-    seams_->finishInParallel(grid_->description().coordinate_bytes,
+    seams_->finishInParallel(grid.coordinate_bytes,
                              [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
                                sinks.local().add(splat, values);
                                progress_->advance(1);

@@ -87,7 +87,7 @@ class ValuePasses {
   ValueSample sample_;
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<SeamMerger> seams_;
-  const GridSource* grid_ = nullptr;  // a structured one, whose values are scattered
+  const NodeReader* reader_ = nullptr;  // of a structured grid, whose values are scattered
   std::string warning_of_walls_;
   uint64_t temporary_bytes_ = 0;
 };

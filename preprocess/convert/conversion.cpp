@@ -241,6 +241,8 @@ class Conversion {
   void mergeSeams() {
     if (makesSplats()) splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
     splats_.thin_walls = origin_->thinWalls();
+    if (const std::string warning = origin_->warningOfWalls(); !warning.empty())
+      report_.warnings.push_back(warning);
     file_->close(!ranks_.alone());
     splats_.buckets = file_->chains();
     sample_->gatherFrom(ranks_);

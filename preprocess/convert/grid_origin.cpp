@@ -96,6 +96,13 @@ std::vector<std::string> GridOrigin::warnings() {
   return warnings;
 }
 
+std::string GridOrigin::warningOfWalls() const {
+  if (!walls_.too_many) return "";
+  return "values differ at more than half a million pairs of nodes that have one position; these are merged, "
+         "and have "
+         "the mean of both";
+}
+
 std::vector<std::string> GridOrigin::notes() {
   if (!hasOwners()) return {};
   return {overlapNote(description(), overlaps_)};
@@ -140,8 +147,8 @@ uint64_t GridOrigin::finish(const SinkOfThread& sink_of_thread, Progress& progre
     return 0;
   }
   // The slabs' memory is free by now.
-  walls_ = findThinWalls(*seams_, reader_.source(), {plan_.slab_bytes, scratch_}, progress);
-  seams_->keepApart(ThinWalls(walls_, blocks()));
+  walls_ = findThinWalls(*seams_, reader_, {plan_.slab_bytes, scratch_}, progress);
+  seams_->keepApart(ThinWalls(walls_.boxes, blocks()));
   const uint64_t merged = seams_->finishInParallel(
       description().coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
         sink_of_thread().add(splat, values);

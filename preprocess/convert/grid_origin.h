@@ -14,6 +14,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/overset/block_owners.h"
 #include "preprocess/seams/seams.h"
+#include "preprocess/seams/wall_search.h"
 #include "preprocess/survey/grid_survey.h"
 
 namespace curvisplat {
@@ -45,7 +46,8 @@ class GridOrigin final : public SplatOrigin {
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, const ScatterNotes& notes,
                         Progress& progress) override;
   uint64_t finish(const SinkOfThread& sink_of_thread, Progress& progress) override;
-  std::vector<WallSide> thinWalls() const override { return walls_; }
+  std::vector<WallSide> thinWalls() const override { return walls_.boxes; }
+  std::string warningOfWalls() const override;
   FacesFiles writeFaces(const FacesJob& job, Progress& progress) override {
     return writeGridFaces(reader_, job, smallSlabs(job.halo()), progress);
   }
@@ -67,7 +69,7 @@ class GridOrigin final : public SplatOrigin {
   std::unique_ptr<AbuttingFaces> faces_;  // of cells
   std::optional<PositionSample> sample_;  // from survey() to count(), if it is large enough to plan by
   std::unique_ptr<SeamMerger> seams_;     // of nodes
-  std::vector<WallSide> walls_;
+  FoundWalls walls_;
 };
 
 }  // namespace curvisplat

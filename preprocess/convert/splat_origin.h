@@ -121,6 +121,8 @@ class SplatOrigin {
   virtual uint64_t finish(const SinkOfThread&, Progress&) { return 0; }
   /// The boxes of walls.bin, after finish().
   virtual std::vector<WallSide> thinWalls() const { return {}; }
+  /// Empty, or a warning of thin walls that are not kept, after finish().
+  virtual std::string warningOfWalls() const { return ""; }
   /// Writes the surfaces of what the splats fill, if it has any. Call it at any time, after a resumed
   /// conversion too.
   virtual FacesFiles writeFaces(const FacesJob&, Progress&) { return {}; }

@@ -60,6 +60,20 @@ ThinWalls::ThinWalls(std::span<const WallSide> boxes, std::span<const GridBlock>
   std::sort(runs_.begin(), runs_.end(), [](const Run& a, const Run& b) {
     return std::tie(a.begin, a.end, a.side) < std::tie(b.begin, b.end, b.side);
   });
+  // Boxes of several nodes may overlap.
+  std::vector<Run> apart;
+  for (Run run : runs_) {
+    if (!apart.empty() && run.begin < apart.back().end) {
+      if (run.side == apart.back().side) {
+        apart.back().end = std::max(apart.back().end, run.end);
+        continue;
+      }
+      run.begin = apart.back().end;
+      if (run.begin >= run.end) continue;
+    }
+    apart.push_back(run);
+  }
+  runs_ = std::move(apart);
 }
 
 uint32_t ThinWalls::sideOf(uint64_t node) const {

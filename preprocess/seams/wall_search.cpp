@@ -12,6 +12,7 @@
 #include "preprocess/coincidence/record_sorter.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/seams/thin_walls.h"
+#include "stream/base/error.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -19,17 +20,36 @@ namespace {
 
 constexpr double kRounding =
     1e-6;  // of a scalar's largest value: values stored in single precision agree to this
-constexpr size_t kMaxScalars = 16;                                          // of those that decide
-constexpr size_t kKeySize = 3;                                              // of a record
+constexpr size_t kMaxScalars = 16;              // of those that decide
+constexpr size_t kMostNodes = size_t{1} << 19;  // on walls: they take 150 bytes each
+constexpr size_t kKeySize = 3;                  // of a record
 constexpr uint64_t kMaxBoxNodes = 65536, kFewNodes = 4096, kMaxSparse = 8;  // of what is read at a time
 
+/// Whether a scalar, which need not be one that is converted, can be read at all.
+bool isReadable(const GridSource& grid, uint32_t scalar) {
+  NodeArrays nodes;
+  const std::array<uint32_t, 1> scalars{scalar};
+  try {
+    readBox(grid, 0, {0, 1, 0, 1, 0, 1}, scalars, nodes);
+    return true;
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const OutputError&) {
+    throw;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 /// The stored scalars at nodes; magnitudes follow from their components.
-std::vector<uint32_t> decidingScalars(const GridDescription& grid) {
+std::vector<uint32_t> decidingScalars(const GridSource& source) {
+  const GridDescription& grid = source.description();
   std::vector<uint32_t> scalars;
   if (grid.globe) return scalars;
   for (uint32_t n = 0; n < grid.scalars.size() && scalars.size() < kMaxScalars; ++n) {
     const GridScalar& scalar = grid.scalars[n];
-    if (scalar.centring == Centring::kNode && !scalar.derived && !scalar.name.ends_with(":mag"))
+    if (scalar.centring == Centring::kNode && !scalar.derived && !scalar.name.ends_with(":mag") &&
+        isReadable(source, n))
       scalars.push_back(n);
   }
   return scalars;
@@ -75,14 +95,16 @@ class Numbering {
 /// The values of a scalar: their range, where halves meet and in some rows, and from these rows their median and spread.
 class ScalarExtent {
  public:
+  explicit ScalarExtent(std::optional<double> blank_value) : blank_value_(blank_value) {}
   void add(double value) {
-    if (!std::isfinite(value)) return;
+    if (isBlank(value)) return;
+    numbers_things_ = numbers_things_ && value == std::floor(value);
     least_ = std::min(least_, value);
     most_ = std::max(most_, value);
   }
   void addToSample(double value) {
     add(value);
-    if (std::isfinite(value)) sample_.push_back(value);
+    if (!isBlank(value)) sample_.push_back(value);
   }
   /// Call it once, after all values.
   void finish() {
@@ -96,13 +118,20 @@ class ScalarExtent {
     sample_ = {};
   }
   bool differ(double a, double b) const {
+    if (numbers_things_ || isBlank(a) || isBlank(b)) return false;
     const double scale = spread_ + std::max(std::abs(a - median_), std::abs(b - median_));
     return std::abs(a - b) > std::max({kWallShare * scale, kNoise * (most_ - least_),
                                        kRounding * std::max(std::abs(least_), std::abs(most_))});
   }
 
  private:
+  bool isBlank(double value) const {
+    return !std::isfinite(value) || (blank_value_ && value == double(float(*blank_value_)));
+  }
+
   static constexpr double kTail = 0.05, kNoise = 1e-4;
+  std::optional<double> blank_value_;
+  bool numbers_things_ = true;  // all values are whole: numbers of blocks, of processes, of nodes
   double least_ = std::numeric_limits<double>::infinity(), most_ = -std::numeric_limits<double>::infinity();
   double median_ = 0, spread_ = 0;
   std::vector<double> sample_;
@@ -110,15 +139,15 @@ class ScalarExtent {
 
 class WallSearch {
  public:
-  WallSearch(const GridSource& grid, std::vector<uint32_t> scalars, const WallSearchMemory& memory,
-             const Progress& progress)
+  WallSearch(const GridSource& grid, std::vector<uint32_t> scalars, std::optional<double> blank_value,
+             const WallSearchMemory& memory, const Progress& progress)
       : grid_(grid),
         progress_(progress),
         scalars_(std::move(scalars)),
         numbering_(grid.description().blocks),
         asked_(kKeySize, memory.bytes / 4, memory.temporary_folder),
         values_(kKeySize + scalars_.size(), memory.bytes / 2, memory.temporary_folder),
-        extents_(scalars_.size()) {}
+        extents_(scalars_.size(), ScalarExtent(blank_value)) {}
 
   /// Adds nodes at one position. Any thread.
   void add(std::span<const uint64_t> nodes) {
@@ -231,7 +260,7 @@ class WallSearch {
                                      [&](const double* first) { return !differ(first, record); });
       const auto side = static_cast<uint32_t>(like - first_of_side.begin());
       if (like == first_of_side.end()) first_of_side.push_back(record);
-      if (side > 0) found.push_back({RecordSorter::numberOf(record), side});
+      if (side > 0 && found.size() <= kMostNodes) found.push_back({RecordSorter::numberOf(record), side});
     }
     set_.clear();
   }
@@ -253,14 +282,17 @@ class WallSearch {
 
 }  // namespace
 
-std::vector<WallSide> findThinWalls(SeamMerger& seams, const GridSource& grid, const WallSearchMemory& memory,
-                                    const Progress& progress) {
-  std::vector<uint32_t> scalars = decidingScalars(grid.description());
+FoundWalls findThinWalls(SeamMerger& seams, const NodeReader& reader, const WallSearchMemory& memory,
+                         const Progress& progress) {
+  const GridSource& grid = reader.source();
+  std::vector<uint32_t> scalars = decidingScalars(grid);
   if (scalars.empty()) return {};
-  WallSearch search(grid, std::move(scalars), memory, progress);
+  WallSearch search(grid, std::move(scalars), reader.blankValue(), memory, progress);
   seams.forEachJoint(grid.description().coordinate_bytes,
                      [&](std::span<const uint64_t> nodes) { search.add(nodes); });
-  return wallSidesOf(search.finish(), grid.description().blocks);
+  const std::vector<WallNode> nodes = search.finish();
+  if (nodes.size() > kMostNodes) return {{}, true};
+  return {wallSidesOf(nodes, grid.description().blocks), false};
 }
 
 uint64_t countMissing(std::span<const WallSide> boxes, std::span<const GridBlock> blocks,

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/node_reader.h"
 #include "preprocess/seams/seams.h"
 #include "preprocess/seams/thin_walls.h"
 #include "stream/base/progress.h"
@@ -32,12 +32,19 @@ struct WallSearchMemory {
   std::filesystem::path temporary_folder;
 };
 
-/// The boxes of nodes that are not to be merged with those at their places. The scalars that the grid's files store at
-/// nodes decide, whichever of them are converted; without any, and for maps of the Earth, the result is empty. To be called
-/// when `seams` has all splats, before they are merged. Throws Error if a file or the disk fails, Interrupted if the
-/// progress is stopped.
-std::vector<WallSide> findThinWalls(SeamMerger& seams, const GridSource& grid, const WallSearchMemory& memory,
-                                    const Progress& progress);
+/// The boxes of nodes that are not to be merged with those at their places.
+struct FoundWalls {
+  std::vector<WallSide> boxes;
+  bool too_many =
+      false;  // more than half a million nodes on walls, as where each block has values of its own; no boxes
+};
+
+/// Finds them by the scalars that the grid's files store at nodes, whichever of them are converted; without any, and for maps
+/// of the Earth, there are none. Scalars of whole numbers, such as those of blocks or processes, and what cannot be read decide
+/// nothing. To be called when `seams` has all splats, before they are merged. Throws Error if a file or the disk fails,
+/// Interrupted if the progress is stopped.
+FoundWalls findThinWalls(SeamMerger& seams, const NodeReader& reader, const WallSearchMemory& memory,
+                         const Progress& progress);
 
 /// How many nodes of the boxes are on no side of `others`.
 uint64_t countMissing(std::span<const WallSide> boxes, std::span<const GridBlock> blocks,

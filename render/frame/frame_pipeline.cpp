@@ -296,6 +296,7 @@ uint64_t FramePipeline::exchangeBytes(const FrameOptions& options) const {
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                                Progress* progress) {
+  samples_others_ = false;
   const auto throwIfStopped = [&] {
     curvisplat::throwIfStopped(options.stop);
     if (progress) progress->throwIfStopped();
@@ -313,6 +314,7 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
 
 void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options,
                            FrameStatistics& statistics) {
+  samples_others_ = samples_others_ || (work.variables && *work.variables != variables());
   makePools(options, work.variables.value_or(variables()));
   const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   try {
@@ -502,6 +504,7 @@ void FramePipeline::stopStages() {
 
 void FramePipeline::prefetch(const FramePlan& plan, const FrameOptions& options) {
   endPrefetch();
+  if (samples_others_) return;  // which would drop what is fetched now
   makePools(options, variables());
   std::vector<BrickPart> parts;
   for (const SweptPart& part : plan.parts) parts.push_back(fetchedPart(part));

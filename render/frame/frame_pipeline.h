@@ -199,7 +199,8 @@ class FramePipeline {
   const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
   std::unique_ptr<PaintingBackend> backend_;
-  PaintingBackend* painting_;  // backend_, except in drawBy()
+  PaintingBackend* painting_;    // backend_, except in drawBy()
+  bool samples_others_ = false;  // the layers of the last picture are of scalars that its splats do not have
   uint64_t aside_bytes_ = 0;
   size_t aside_waiting_splats_ = 0;
   HiddenBricks hidden_;

@@ -22,7 +22,7 @@ class IsoLayers {
     std::optional<Light> light;  // none: a light at the viewer
     IsoOpacity opacity = {};
     bool colours_of_other = false;                               // of the other scalar
-    std::span<const std::optional<glm::vec3>> own_colours = {};  // SurfaceScene::iso_colours
+    std::span<const std::optional<glm::vec3>> own_colours = {};  // as IsoGroup::own_colours
   };
   explicit IsoLayers(ImageSize size);
 

@@ -25,12 +25,17 @@ bool WatchedFile::isSame() const {
 
 bool WatchedFile::isWhole() const {
   const State now = stateOf(path_);
-  const bool is_other = now.device != opened_.device || now.number != opened_.number;
-  return now == opened_ || is_other || now.bytes > opened_.bytes;
+  if (now == opened_ || now == State{}) return true;
+  return isOpened(now) && now.bytes > opened_.bytes;
+}
+
+bool WatchedFile::isOpened(const State& now) const {
+  return now.device == opened_.device && now.number == opened_.number;
 }
 
 void WatchedFile::requireWhole() const {
-  if (!isWhole()) failAsChanged();
+  const State now = stateOf(path_);
+  if (isOpened(now) && now.bytes < opened_.bytes) failAsChanged();
 }
 
 void WatchedFile::failAsChanged() const {

@@ -17,10 +17,11 @@ class WatchedFile {
 
   /// Whether the name has a file of the same length and the same time of change.
   bool isSame() const;
-  /// Whether the file has neither become shorter since, nor was written again with the same length. One that grows may be that of a
-  /// running program, whose earlier steps stay; one whose name has gone, or was given to another, is read to its end as it was.
+  /// Whether the file is not known to have changed: it has neither become shorter, nor was it written again with the same length,
+  /// nor was its name given to another one. A file that grows may be that of a running program, whose earlier steps stay; one whose
+  /// name has gone is read to its end as it was.
   bool isWhole() const;
-  /// Throws Error unless isWhole().
+  /// Throws Error if the file has become shorter: what lies beyond its end is read as zeros.
   void requireWhole() const;
   /// Throws Error as requireWhole() does.
   [[noreturn]] void failAsChanged() const;
@@ -34,6 +35,7 @@ class WatchedFile {
     bool operator==(const State& other) const = default;
   };
   static State stateOf(const std::filesystem::path& path);
+  bool isOpened(const State& now) const;
 
   std::filesystem::path path_;
   State opened_;

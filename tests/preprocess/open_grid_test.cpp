@@ -327,6 +327,7 @@ TEST_F(ForeignFormats, FoldersAreNamed) {
   expectNamed("folder", "a directory; expected");
   for (const char* file : {"manifest.json", "bricks.bin"}) std::ofstream(folder_ / "folder" / file) << "{}";
   expectNamed("folder", "a splat cache, which takes no further files");
+  EXPECT_FALSE(isGridFolder(folder_ / "folder"));
 }
 
 TEST_F(ForeignFormats, TextsOfNumbersAreStillTriedAsPlot3d) {

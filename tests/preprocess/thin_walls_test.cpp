@@ -9,6 +9,7 @@
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <map>
+#include <random>
 #include <vector>
 
 #include "preprocess/addition/add_scalar.h"
@@ -213,6 +214,27 @@ TEST_F(ThinWallsTest, BlocksThatMeetAtAPlateStayApartThere) {
   EXPECT_NEAR(volumeOf(splatsOf("b.splats"), 0.3), volumeOf(splatsOf("a.splats"), 0.3), 1e-3);
 }
 
+/// Numbers of blocks or processes differ at every joint, and tell nothing of walls.
+TEST_F(ThinWallsTest, NumbersOfBlocksAreNoWalls) {
+  const FunctionGridSource numbered(
+      std::vector<GridBlock>(2, gridBlock(kNose + 1, kNj, kNk)), 2, [](const GridNode& n) {
+        const glm::dvec3 at = placeAt({0, n.i + n.block * kNose, n.j, n.k});
+        return NodeValues{at, {static_cast<float>(temperature(at)), static_cast<float>(7 + n.block)}};
+      });
+  EXPECT_TRUE(convertTo("a.splats", numbered, {0}).notes.empty());
+}
+
+/// What --blank names is no value of a wall, and hides none.
+TEST_F(ThinWallsTest, BlankValuesHideNoWalls) {
+  const FunctionGridSource blanked({gridBlock(kNi, kNj, kNk)}, 1, [](const GridNode& n) {
+    const bool is_blank = n.j == kNj - 1;
+    return NodeValues{placeAt(n), {is_blank ? -1e30F : static_cast<float>(pressure(xiOf(n)))}};
+  });
+  ConvertOptions of_blank = options("a.splats", {0});
+  of_blank.blank_value = -1e30;
+  EXPECT_EQ(converted(blanked, of_blank).merged_nodes, kWakePairs * kNk);
+}
+
 TEST_F(ThinWallsTest, BytesDependOnTheGridAlone) {
   const FunctionGridSource grid = plate();
   const ConvertReport report = expectSameCaches(
@@ -309,6 +331,16 @@ TEST(WallSides, BoxesHoldTheNodesAndNoOthers) {
   EXPECT_LE(few.size(), 4u);
   const ThinWalls coarse(few, blocks);
   for (const WallNode& node : nodes) EXPECT_EQ(coarse.sideOf(node.node), 1u) << node.node;
+  // Boxes that overlap.
+  const std::vector<GridBlock> face{gridBlock(60, 60, 1)};
+  std::mt19937 random(5);
+  nodes.clear();
+  for (uint64_t node = 0; node < 3600; ++node)
+    if (random() % 2 == 0) nodes.push_back({node, 1});
+  const std::vector<WallSide> overlapping = wallSidesOf(nodes, face, 400);
+  EXPECT_GT(overlapping.size(), 100u);
+  const ThinWalls of_face(overlapping, face);
+  for (const WallNode& node : nodes) EXPECT_EQ(of_face.sideOf(node.node), 1u) << node.node;
 }
 
 }  // namespace

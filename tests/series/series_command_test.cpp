@@ -377,7 +377,8 @@ TEST_F(Follow, TriesTheLastFileAgainWhenItHasChanged) {
     FolderWatch watch(folder_.path());
     watch.waitUntil([&] { return bytesOfFile(file("said")).find("not taken yet: ") != std::string::npos; });
   }
-  std::ofstream(file("w_0001.fun"), std::ios::binary) << whole;
+  std::ofstream(file("whole"), std::ios::binary) << whole;
+  fs::rename(file("whole"), file("w_0001.fun"));
   EXPECT_EQ(following.wait().status, 0);
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
   const std::string said = bytesOfFile(file("said"));

@@ -164,8 +164,8 @@ void follow(const ConvertArguments& arguments) {
       events.wait(files.untilNext(), progress);
       continue;
     }
-    // What fails may not be written yet. But of the first step, options may be wrong.
-    const bool may_grow = options.add && files.isLast();
+    // What fails may not be written yet. But before a first step, options may be wrong.
+    const bool may_grow = !converted.empty() && files.isLast();
     options.keep_going = arguments.keep_going && !may_grow;
     try {
       for (const StepFiles& one : stepsIn(*step)) {
@@ -188,8 +188,10 @@ void follow(const ConvertArguments& arguments) {
       throw;
     } catch (const OutputError&) {
       throw;
+    } catch (const UsageError&) {
+      throw;
     } catch (const Error& error) {
-      if (!may_grow) throw;
+      if (!files.isLast() || converted.empty()) throw;
       progress.end();
       printMessage("warning: not taken yet: {}; it is tried again when the file has changed", error.what());
       files.tryAgain(*step);

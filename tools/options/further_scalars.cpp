@@ -26,8 +26,10 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_update.h"
 #include "stream/cache/faces_file.h"
+#include "stream/model/thin_walls.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/kept_conversion.h"
+#include "tools/options/point_values.h"
 
 namespace curvisplat {
 namespace {
@@ -50,8 +52,10 @@ SeriesOptions optionsLike(const CacheReader& cache, const fs::path& output) {
 
 /// Whether two steps agree in all that other options would have changed.
 bool isSameStep(const Manifest& a, const Manifest& b) {
-  return a.nodes == b.nodes && a.blanked_nodes == b.blanked_nodes && a.splats == b.splats &&
-         a.cells == b.cells && a.lower == b.lower && a.upper == b.upper;
+  // Earlier programs merged the sides of thin walls.
+  const bool has_same_splats = a.splats == b.splats || a.hasFeature(kThinWalls) != b.hasFeature(kThinWalls);
+  return a.nodes == b.nodes && a.blanked_nodes == b.blanked_nodes && has_same_splats && a.cells == b.cells &&
+         a.lower == b.lower && a.upper == b.upper;
 }
 
 [[noreturn]] void refuse(const CacheReader& cache, const std::string& name) {
@@ -121,6 +125,27 @@ ConvertArguments argumentsFor(const std::vector<fs::path>& files, const fs::path
   return arguments;
 }
 
+/// Opens the time step of the files that the cache is of.
+std::unique_ptr<DataSource> openStepOf(const CacheReader& reader, ConvertArguments& arguments,
+                                       const fs::path& cache) {
+  std::unique_ptr<DataSource> source = openSource(arguments, cache);
+  if (const auto step = otherStep(reader.manifest(), source->description(), arguments.grid)) {
+    arguments.grid.time_step = step;
+    source = openSource(arguments, cache);
+  }
+  return source;
+}
+
+/// Whether `after` has the values of `before`, as far as ranges and times tell.
+bool hasSameValues(const Manifest& after, const Manifest& before) {
+  const auto is_in = [&](const VariableInfo& one) {
+    const auto same = std::ranges::find(after.variables, one.name, &VariableInfo::name);
+    return same != after.variables.end() && same->min == one.min && same->max == one.max;
+  };
+  return isSameStep(after, before) && after.steps.front().time == before.steps.front().time &&
+         std::ranges::all_of(before.variables, is_in);
+}
+
 /// Converts the files again with the scalars that the cache has and `name`, which not all its samples have, as addScalarToSeries() does.
 void convertAgainWith(const fs::path& cache, const std::vector<fs::path>& files, const std::string& name,
                       Progress& progress) {
@@ -136,16 +161,18 @@ void convertAgainWith(const fs::path& cache, const std::vector<fs::path>& files,
   const PreviewFolder folder(whole.parent_path(), folder_name);  // in the end, of the old one
   arguments.output = folder.path() / whole.filename();
   ConvertOptions options = optionsLike(before, arguments.output).convert;
-  const auto source = openSource(arguments, arguments.output);
+  const auto source = openStepOf(before, arguments, arguments.output);
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
   options.differing = DifferingScalars::kKeepApart;
   const ConvertReport report = convert(*source, options, progress);
-  if (!isSameStep(CacheReader(arguments.output).manifest(), before.manifest()))
+  if (!hasSameValues(CacheReader(arguments.output).manifest(), before.manifest()))
     throw Error(
         "{}: these files and the default options of convert make another cache; convert it again with {}",
         whole.string(), name);
   lock.requireStillThere();
   exchange(arguments.output, whole);
+  for (const auto* warnings : {&source->description().warnings, &report.warnings})
+    for (const std::string& warning : *warnings) printMessage("warning: {}", warning);
   for (const std::string& note : report.notes) printMessage("note: {}", note);
 }
 
@@ -210,7 +237,7 @@ void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files,
   if (isSeries(CacheReader(cache))) return addScalarToSeries(cache, files, name, progress);
   ConvertArguments arguments = argumentsFor(files, cache);
   arguments.added_scalars = {name};
-  const auto source = openSource(arguments, cache);
+  const auto source = openStepOf(CacheReader(cache), arguments, cache);
   AddScalarOptions options;
   options.cache = cache;
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());

@@ -71,17 +71,6 @@ void setGlobe(const Manifest& manifest, GlobeOptions& options) {
   options.vertical_scale = globe.vertical_scale;
 }
 
-/// The time step of the files whose time the cache has, if it is another one than was opened and none was asked for.
-std::optional<uint32_t> otherStep(const Manifest& manifest, const GridDescription& description,
-                                  const OpenGridOptions& options) {
-  const std::vector<double>& times = description.times;
-  const double time = manifest.steps.front().time;
-  if (options.time_step || times.size() < 2 || std::ranges::count(times, time) != 1) return std::nullopt;
-  const auto step = static_cast<uint32_t>(std::ranges::find(times, time) - times.begin());
-  if (step == description.time_step) return std::nullopt;
-  return step;
-}
-
 bool describesAll(const Manifest& manifest, OpenGridOptions options, const std::vector<fs::path>& files) {
   try {
     std::unique_ptr<DataSource> source = openData(options);
@@ -135,6 +124,16 @@ std::vector<std::optional<SourceValues>> sourceValues(const CacheReader& reader,
 }
 
 }  // namespace
+
+std::optional<uint32_t> otherStep(const Manifest& manifest, const GridDescription& description,
+                                  const OpenGridOptions& options) {
+  const std::vector<double>& times = description.times;
+  const double time = manifest.steps.front().time;
+  if (options.time_step || times.size() < 2 || std::ranges::count(times, time) != 1) return std::nullopt;
+  const auto step = static_cast<uint32_t>(std::ranges::find(times, time) - times.begin());
+  if (step == description.time_step) return std::nullopt;
+  return step;
+}
 
 std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache) {
   std::vector<fs::path> files;

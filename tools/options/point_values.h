@@ -27,6 +27,10 @@ std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std
 void setSource(const CacheReader& reader, const std::vector<std::filesystem::path>& files,
                OpenGridOptions& grid);
 
+/// The time step of the files whose time the cache has, if it is another one than was opened and none was asked for.
+std::optional<uint32_t> otherStep(const Manifest& manifest, const GridDescription& description,
+                                  const OpenGridOptions& options);
+
 /// The source of exact values, beside a cache.
 struct PointSource {
   OpenGridOptions grid;  // with its files

@@ -110,7 +110,8 @@ std::vector<GivenIsovalue> parseIsovalues(const SurfaceArguments& arguments) {
     const size_t equals = text.rfind('=');
     const std::string scalar = equals == std::string::npos ? arguments.iso_by : text.substr(0, equals);
     if (equals == 0) throw UsageError("--iso {}: no scalar before the '='; expected NAME=VALUE", text);
-    if (scalar.find('=') != std::string::npos)
+    const size_t inner = equals == std::string::npos ? equals : scalar.find('=');  // or of a name
+    if (inner != std::string::npos && scalar.find(',', inner) != std::string::npos)
       throw UsageError("--iso {}: has two scalars; give --iso NAME=VALUE,... once for each", text);
     for (const std::string& value :
          splitAtCommas({text.substr(equals == std::string::npos ? 0 : equals + 1)}))
@@ -131,7 +132,7 @@ std::vector<std::optional<glm::vec3>> parseIsoColours(const SurfaceArguments& ar
   std::vector<std::optional<glm::vec3>> colours;
   for (const std::string& text : splitAtCommas(arguments.iso_colours))
     colours.push_back(text == "function" ? std::nullopt : std::optional(parseColour("iso", text)));
-  const size_t count = splitAtCommas(arguments.isovalues).size();
+  const size_t count = parseIsovalues(arguments).size();
   if (!colours.empty() && count == 0) throw UsageError("--iso-colour needs an isosurface: --iso VALUE");
   if (colours.size() == 1)
     for (size_t n = 1; n < count; ++n) colours.push_back(colours.front());

@@ -377,7 +377,10 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, const FurtherScalars* furth
     ImGui::PushID(static_cast<int>(n));
     ImGui::Separator();
     const std::string name = fmt::format("isosurface {}", n + 1);
+    const auto& all = cache_.manifest().variables;
+    ImGui::BeginDisabled(std::ranges::find(all, one.scalar, &VariableInfo::name) == all.end());
     actions.changed |= eye(one.visible, name);
+    ImGui::EndDisabled();
     ImGui::SameLine();
     ImGui::SetNextItemWidth(removeFrom() - ImGui::GetStyle().ItemSpacing.x - ImGui::GetCursorPosX());
     chooseScalarOf(n, one, further, actions);

@@ -316,6 +316,8 @@ AskedDifferences ViewState::askedDifferences(const CacheReader& cache) const {
   if (faces_by && std::ranges::any_of(faces, &NamedFaces::visible))
     asked.axes.push_back({cache.variableNamed(faces_by->variable), faces_by->function.axis()});
   for (const std::vector<Isosurface>& group : drawnIsosurfaces()) {
+    const auto& all = cache.manifest().variables;
+    if (std::ranges::find(all, group.front().scalar, &VariableInfo::name) == all.end()) continue;
     AskedIsovalues& values = asked.isosurfaces.emplace_back();
     values.variable = cache.variableNamed(group.front().scalar);
     for (const Isosurface& one : group) values.values.push_back(one.value);

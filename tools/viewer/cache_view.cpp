@@ -172,7 +172,8 @@ void CacheView::draw(const WindowLayout& layout) {
     }
     showPicture(layout);
     savePictureIfFinal();
-    if (copy_requested_ && !chooser_.busy()) copyCommand(*std::exchange(copy_requested_, std::nullopt));
+    if (copy_requested_ && !chooser_.busy() && finding_isosurfaces_.empty())
+      copyCommand(*std::exchange(copy_requested_, std::nullopt));
     probe(layout);
     showPlanesAndMarkers(layout);
     keepHistory();

@@ -226,7 +226,7 @@ void CacheView::saveTo(const fs::path& file) {
 
 /// A picture that stays on the card is drawn again to be read: the same one.
 void CacheView::savePictureIfFinal() {
-  if (!save_to_ || !isFinal()) return;
+  if (!save_to_ || !isFinal() || !finding_isosurfaces_.empty()) return;
   if (shown_->on_card) {
     reports_.attempt([&] { ask(false, true); }, About::kPicture);
     return;

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 #include <imgui.h>
-#include <imgui_internal.h>  // GetItemID()
+#include <imgui_internal.h>  // GetItemID(), MarkItemEdited()
 
 #include <algorithm>
 #include <array>
@@ -147,6 +147,7 @@ bool typedSlider(const char* label, ImGuiDataType type, T& value, const T ends[2
   const bool held = std::exchange(io.KeyCtrl, io.KeyCtrl || again);
   const bool changed = ImGui::SliderScalar(label, type, &value, &ends[0], &ends[1], format, flags);
   io.KeyCtrl = held;
+  if (restored) ImGui::MarkItemEdited(id);
   return changed || restored;
 }
 

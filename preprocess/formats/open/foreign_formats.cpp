@@ -401,9 +401,6 @@ std::optional<std::string> foreignFolder(const std::filesystem::path& folder) {
   for (const char* mark : {"md.idx", "data.0"})
     if (std::filesystem::is_regular_file(folder / mark, error))
       return "an ADIOS2 file (.bp), which is not read (save it as VTK, with ParaView)";
-  if (std::filesystem::is_regular_file(folder / "manifest.json", error) &&
-      std::filesystem::is_regular_file(folder / "bricks.bin", error))
-    return "a splat cache, which takes no further files and is not converted again (draw it alone)";
   if (std::filesystem::is_regular_file(folder / "system" / "controlDict", error) && !isFoamCase(folder))
     return "an OpenFOAM case without a mesh: there is no constant/polyMesh (blockMesh, or what else the "
            "case's "
@@ -429,6 +426,11 @@ std::optional<std::string> foreignHdf5(const std::filesystem::path& path) {
 }
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
+  if (isRegularFile(path / "manifest.json") && isRegularFile(path / "bricks.bin"))
+    throw Error(
+        "{}: is a splat cache, which takes no further files and is not converted again (draw it alone); "
+        "expected {}",
+        path.string(), expected);
   if (const auto format = foreignFolder(path))
     throw Error("{}: is {}; expected {}", path.string(), *format, expected);
   std::error_code none_there;

@@ -105,7 +105,8 @@ def _numbers(values: Sequence[float]) -> str:
 def _isovalues(value: Any) -> Sequence[str]:
     """Options of --iso: one for each value, or for each scalar of a dict."""
     if isinstance(value, Mapping):
-        return [f"{name}={_numbers(_arguments.several(of_it, (int, float)))}" for name, of_it in value.items()]
+        by_name = {name: _arguments.several(of_it, (int, float)) for name, of_it in value.items()}
+        return [f"{name}={_numbers(values)}" for name, values in by_name.items() if values]
     return [_number(one) for one in _arguments.several(value, (int, float))]
 
 
