@@ -89,7 +89,7 @@ void ValuePasses::mergeSeams() {
     const GridDescription& grid = reader_->source().description();
     const std::vector<GridBlock>& blocks = grid.blocks;
     const ThinWalls walls = thinWallsOf(*cache_);
-    // Of a series the second step tells.
+    // The second step of a series tells.
     const std::vector<WallSide> of_values =
         cache_->series().steps.size() > 1
             ? std::vector<WallSide>{}

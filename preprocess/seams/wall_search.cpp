@@ -20,9 +20,9 @@ namespace {
 
 constexpr double kRounding =
     1e-6;  // of a scalar's largest value: values stored in single precision agree to this
-constexpr size_t kMaxScalars = 16;              // of those that decide
-constexpr size_t kMostNodes = size_t{1} << 19;  // on walls: they take 150 bytes each
-constexpr size_t kKeySize = 3;                  // of a record
+constexpr size_t kMaxScalars = 16;             // of those that decide
+constexpr size_t kMaxNodes = size_t{1} << 19;  // on walls: they take 150 bytes each
+constexpr size_t kKeySize = 3;                 // of a record
 constexpr uint64_t kMaxBoxNodes = 65536, kFewNodes = 4096, kMaxSparse = 8;  // of what is read at a time
 
 /// Whether a scalar, which need not be one that is converted, can be read at all.
@@ -260,7 +260,7 @@ class WallSearch {
                                      [&](const double* first) { return !differ(first, record); });
       const auto side = static_cast<uint32_t>(like - first_of_side.begin());
       if (like == first_of_side.end()) first_of_side.push_back(record);
-      if (side > 0 && found.size() <= kMostNodes) found.push_back({RecordSorter::numberOf(record), side});
+      if (side > 0 && found.size() <= kMaxNodes) found.push_back({RecordSorter::numberOf(record), side});
     }
     set_.clear();
   }
@@ -291,7 +291,7 @@ FoundWalls findThinWalls(SeamMerger& seams, const NodeReader& reader, const Wall
   seams.forEachJoint(grid.description().coordinate_bytes,
                      [&](std::span<const uint64_t> nodes) { search.add(nodes); });
   const std::vector<WallNode> nodes = search.finish();
-  if (nodes.size() > kMostNodes) return {{}, true};
+  if (nodes.size() > kMaxNodes) return {{}, true};
   return {wallSidesOf(nodes, grid.description().blocks), false};
 }
 

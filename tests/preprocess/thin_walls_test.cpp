@@ -224,7 +224,7 @@ TEST_F(ThinWallsTest, NumbersOfBlocksAreNoWalls) {
   EXPECT_TRUE(convertTo("a.splats", numbered, {0}).notes.empty());
 }
 
-/// What --blank names is no value of a wall, and hides none.
+/// The value of --blank is none of a wall, and hides none.
 TEST_F(ThinWallsTest, BlankValuesHideNoWalls) {
   const FunctionGridSource blanked({gridBlock(kNi, kNj, kNk)}, 1, [](const GridNode& n) {
     const bool is_blank = n.j == kNj - 1;
