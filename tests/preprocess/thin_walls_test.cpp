@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "preprocess/addition/add_scalar.h"
@@ -17,8 +18,10 @@
 #include "preprocess/convert/convert.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/seams/thin_walls.h"
+#include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_update.h"
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/manifest.h"
 #include "stream/model/splats.h"
@@ -278,6 +281,19 @@ TEST_F(ThinWallsTest, ADamagedListIsNamed) {
   }
   overwriteFile(path, whole);
   EXPECT_TRUE(verifyCache(CacheReader(folder_ / "a.splats")).findings.empty());
+  // A malicious one has its checksum, and the whole block again and again, each row of which takes memory.
+  const std::vector<WallSide> boxes(20, WallSide{0, 1, {0, 0, 0}, {kNi - 1, kNj - 1, kNk - 1}});
+  const auto listed = std::as_bytes(std::span(boxes));
+  const Manifest manifest = CacheReader(folder_ / "a.splats").manifest();
+  Manifest malicious = manifest;
+  const auto info = std::ranges::find(malicious.files, kThinWallsFileName, &FileInfo::name);
+  *info = {kThinWallsFileName, listed.size(), checksumOf(listed)};
+  overwriteFile(path, {reinterpret_cast<const char*>(listed.data()), listed.size()});
+  replaceManifest(folder_ / "a.splats", malicious);
+  expectSays(errorOf([&] { added(grid, adding); }),
+             "walls.bin: is damaged (has boxes that are not of the grid)");
+  overwriteFile(path, whole);
+  replaceManifest(folder_ / "a.splats", manifest);
   added(grid, adding);
 }
 
