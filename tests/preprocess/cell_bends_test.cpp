@@ -32,7 +32,8 @@ std::unique_ptr<GridSource> gridOf(const std::vector<GridBlock>& blocks, const P
   return std::make_unique<FunctionGridSource>(blocks, 1, [place](const GridNode& node) {
     const glm::dvec3 index(static_cast<double>(node.i), static_cast<double>(node.j),
                            static_cast<double>(node.k));
-    return NodeValues{place(index, node.block), {static_cast<float>(index.x)}};
+    const glm::dvec3 at = place(index, node.block);
+    return NodeValues{at, {static_cast<float>(at.x)}};  // the same where blocks meet
   });
 }
 

@@ -368,8 +368,8 @@ TEST_F(Follow, TriesTheLastFileAgainWhenItHasChanged) {
   fs::rename(file("w_0002.fun"), file("later"));
   fs::resize_file(file("w_0001.fun"), whole.size() / 2);
   const auto command = [&](const char* cache, const std::string& more) {
-    return fmt::format("exec '{}' convert '{}' '{}' --follow --until 2 -o '{}' {} 2>'{}'", CURVISPLAT_PROGRAM,
-                       file("w.xyz"), file("w_*.fun"), file(cache), more, file("said"));
+    return fmt::format("exec '{}' convert '{}' '{}' --follow --until 2 --refine 1 -o '{}' {} 2>'{}'",
+                       CURVISPLAT_PROGRAM, file("w.xyz"), file("w_*.fun"), file(cache), more, file("said"));
   };
   std::ofstream(file("said"));
   RunningProgram following({"-c", command("a.splats", "")}, "/bin/sh");
