@@ -165,7 +165,7 @@ TEST_F(RanksCommand, ThatHaveOtherOptionsAreRefused) {
   const std::string convert = "convert g.xyz g.fun -o mixed.splats";
   expectOtherRefused(convert, convert + " --value-precision fine",
                      "--value-precision is 'fine' here and not given");
-  expectOtherRefused(convert + " --flat", convert, "--flat is not given here and 'true'");
+  expectOtherRefused(convert + " --no-surfaces", convert, "--no-surfaces is not given here and 'true'");
   const std::string render = "render g.splats -o mixed.png --size 60x40";
   if (faults::isWholeSweep()) {
     expectOtherRefused(convert, convert + " --memory 512M", "--memory is '512M' here and not given");
