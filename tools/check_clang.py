@@ -118,7 +118,8 @@ class Group:
             run = subprocess.run(words, cwd=BUILD, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         if run.returncode == 0:
             return ""
-        if len(files) == 1 or (self.tidy and "clang-diagnostic" not in run.stdout):
+        together = any(words in run.stdout for words in ("clang-diagnostic", "PLEASE submit a bug report"))
+        if len(files) == 1 or (self.tidy and not together):
             return run.stdout
         half = len(files) // 2
         return self.findings(files[:half]) + self.findings(files[half:])
