@@ -219,8 +219,8 @@ TEST_F(WindowsCamera, AnOrthographicFirstViewEndsFlight) {
   save();
   press("shift+r");
   EXPECT_EQ(save().rgba, first.rgba);
-  dragPicture(1, 0.2, 0.1);
-  EXPECT_EQ(save().rgba, turned.rgba);
+  dragPicture(1, 0.2, 0.1);  // turns about the data, and does not look around
+  EXPECT_GE(difference(save(), turned), 40);
   close();
 }
 
