@@ -206,24 +206,6 @@ TEST_F(WindowsCamera, TheFirstViewComesBack) {
   close();
 }
 
-/// Flight needs perspective: a drag turns the data again, as it does in a window that never flew.
-TEST_F(WindowsCamera, AnOrthographicFirstViewEndsFlight) {
-  open({"--view", "+x"});
-  save();
-  dragPicture(1, 0.2, 0.1);
-  const Image turned = save();
-  press("shift+r");
-  const Image first = save();
-  EXPECT_LT(difference(first, turned), 30);
-  press("f");
-  save();
-  press("shift+r");
-  EXPECT_EQ(save().rgba, first.rgba);
-  dragPicture(1, 0.2, 0.1);  // turns about the data, and does not look around
-  EXPECT_GE(difference(save(), turned), 40);
-  close();
-}
-
 TEST_F(WindowsCamera, ArrowsTurnTheCameraAsTheOptionsDo) {
   open();
   press("z");
