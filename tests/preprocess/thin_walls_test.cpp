@@ -66,7 +66,7 @@ FunctionGridSource plate(double strength = 1) {
   });
 }
 
-/// The same plate, of two blocks that meet at it and at the wake.
+/// Makes the same plate of two blocks that meet at it and at the wake.
 FunctionGridSource plateOfTwoBlocks() {
   return FunctionGridSource(
       std::vector<GridBlock>(2, gridBlock(kNose + 1, kNj, kNk)), 2, [](const GridNode& n) {

@@ -270,8 +270,7 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   if (options.globe != GlobeOptions{} && !source->description().globe)
     throw UsageError(
         "{}: has no longitudes and latitudes; leave out --sphere, --flat and --vertical-scale (that of "
-        "render "
-        "stretches pictures of any grid)",
+        "render stretches pictures of any grid)",
         complete.grid.string());
   const std::string& format = source->description().format;
   if (options.force != Plot3dForce{} && format.find("PLOT3D") == std::string::npos)
