@@ -388,12 +388,9 @@ TEST_F(FurtherScalarTest, AScalarOfTheSourcesIsAddedWhenItIsChosen) {
   click("scalar");
   placeOf("scalar f");
   click("further scalar volume");
-  EXPECT_TRUE(eventually([] {
-    const ProgramResult info = runProgram({"info", "one.splats"});
-    return info.out.find("volume") != std::string::npos;
-  }));
   saveAndCopy();
-  ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
+  ASSERT_TRUE(eventually([] { return hasWidget("scalar shown: volume"); }, 300));
+  expectSays(runProgram({"info", "one.splats"}).out, "volume");
   saveAndCopy();
   press("ctrl+z");  // the scalar before
   saveAndCopy();
@@ -407,11 +404,7 @@ TEST_F(FurtherScalarTest, OneIsAddedForItsOpacities) {
   open();
   click("opacity by");
   click("further opacity by volume");
-  ASSERT_TRUE(eventually(
-      [] { return hasWidget("automatic") && hasWidget("opacity by") && !hasWidget("opening"); }, 300));
-  ASSERT_TRUE(eventually([] {
-    return runProgram({"info", "one.splats"}).out.find("volume") != std::string::npos;
-  }));
+  ASSERT_TRUE(eventually([] { return hasWidget("opacity shown: volume"); }, 300));
   ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
   save();
   const Image two = saveAndCopy();
@@ -431,12 +424,8 @@ TEST_F(FurtherScalarTest, OneIsAddedForAnIsosurface) {
   save();
   click("scalar of isosurface 1");
   click("isosurface 1 by further volume");
-  ASSERT_TRUE(eventually(
-      [] {
-        return runProgram({"info", "one.splats"}).out.find("volume") != std::string::npos &&
-               !hasWidget("opening");
-      },
-      300));
+  ASSERT_TRUE(eventually([] { return hasWidget("isosurface 1 shows: volume"); }, 300));
+  ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
   moveTo(rest_);
   save();
   const Image drawn = saveAndCopy();
@@ -501,12 +490,9 @@ TEST_F(WindowOpening, AScalarIsAddedToASeries) {
   open({"--step", "1"});
   click("scalar");
   click("further scalar " + further);
-  ASSERT_TRUE(eventually([&] {
-    const bool is_there =
-        runProgram({"info", "street.splats", "--json"}).out.find(fmt::format("\"name\": \"{}\"", further)) !=
-        std::string::npos;
-    return is_there && !hasWidget("opening");
-  }));
+  ASSERT_TRUE(eventually([&] { return hasWidget("scalar shown: " + further); }, 300));
+  ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
+  expectSays(runProgram({"info", "street.splats"}).out, further);
   saveAndCopy();
   const auto commands = close();
   cache_ = "a";

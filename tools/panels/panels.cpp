@@ -199,6 +199,7 @@ void Panels::drawOpacityScalars(const ViewState& state, const PanelFacts& facts,
     ImGui::EndCombo();
   } else {
     nameWidget("opacity by");
+    nameWidget("opacity shown: " + (state.opacity_by ? state.opacity_by->variable : state.variable));
   }
   ImGui::EndDisabled();
 }

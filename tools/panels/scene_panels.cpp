@@ -398,6 +398,7 @@ void SurfacePanel::chooseScalarOf(size_t number, const Isosurface& one, const Fu
   const std::string name = fmt::format("isosurface {}", number + 1);
   if (!ImGui::BeginCombo("##scalar", one.scalar.c_str(), ImGuiComboFlags_HeightLarge)) {
     nameWidget("scalar of " + name);
+    nameWidget(fmt::format("{} shows: {}", name, one.scalar));
     return;
   }
   for (const VariableInfo& info : cache_.manifest().variables) {
