@@ -103,12 +103,13 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments, const 
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, out.write_end, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, err.write_end, STDERR_FILENO);
-  // A shell's background jobs ignore SIGINT, and what they start would, too.
+  // A shell's background jobs ignore SIGINT, those of nohup SIGHUP, and what they start would, too.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   sigset_t answered;
   sigemptyset(&answered);
   sigaddset(&answered, SIGINT);
+  sigaddset(&answered, SIGHUP);
   posix_spawnattr_setsigdefault(&attributes, &answered);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
   const int failed = posix_spawnp(&child_, program.c_str(), &actions, &attributes, argv.data(), environ);
