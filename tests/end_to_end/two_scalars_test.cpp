@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{256, 256};
+constexpr ImageSize kSize{256, 256}, kSmall{128, 128};
 
 /// The scalar of the colours.
 double hueAt(const glm::dvec3& at) {
@@ -67,9 +67,9 @@ class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
   }
 
   Image marched(const OpticalFunction& opacity, const ReferenceField& field,
-                const ReferenceLayers& layers = {}) const {
+                const ReferenceLayers& layers = {}, ImageSize size = kSize) const {
     const TwoScalars scalars{opacity, [](const glm::dvec3& at) { return hues().at(hueAt(at)).colour; }};
-    return toImage(referenceMarch(field, scalars, halfAnnulusCamera(), kSize, stepsFor(field), layers));
+    return toImage(referenceMarch(field, scalars, halfAnnulusCamera(), size, stepsFor(field), layers));
   }
   Image drawn(const TransferFunction& opacity, const FrameOptions& options,
               Backend backend = Backend::kCpu) const {
@@ -231,8 +231,8 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
       *annulus_, {hueAt, kValue, hues().at(kValue).colour, [&](const glm::dvec3& at) {
                     return 0.9 * -std::expm1(-function.exact(annulus_->scalar(at)).extinction * unit);
                   }});
-  const Image reference = marched(function.exact, field_, layers);
-  FrameOptions options = knownFrame(kSize);
+  const Image reference = marched(function.exact, field_, layers, kSmall);
+  FrameOptions options = knownFrame(kSmall);
   auto scene = std::make_shared<SurfaceScene>();
   scene->further_isosurfaces = {{1, {kValue}}};
   scene->iso_opacity = {0.9, false};
@@ -269,8 +269,8 @@ TEST_F(TwoScalarsTest, IsosurfacesAreOfAllScalarsAtOnce) {
     }
     return found;
   };
-  const Image reference = marched(function.exact, field_, layers);
-  FrameOptions options = knownFrame(kSize);
+  const Image reference = marched(function.exact, field_, layers, kSmall);
+  FrameOptions options = knownFrame(kSmall);
   auto scene = std::make_shared<SurfaceScene>();
   scene->isovalues = {kOwn};
   scene->iso_colours = {red};
