@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -100,6 +101,19 @@ void convertStored(const std::byte* from, size_t count, bool swap, Value* to) {
   else
     for (size_t n = 0; n < count; ++n)
       to[n] = convertedTo<Value>(loadStored<Stored>(from + n * sizeof(Stored), false));
+}
+
+/// Reads `count` numbers of the type Stored from `offset` on, and converts them. `from`: an InputFile, a
+/// PooledFile or a ByteSource. Holds 16 KiB of bytes at a time. Throws Error as from.readAt() does.
+template <typename Stored, typename Source, typename Value>
+void readStored(const Source& from, uint64_t offset, uint64_t count, bool swap, Value* to) {
+  constexpr uint64_t kAtOnce = (16 << 10) / sizeof(Stored);
+  std::array<std::byte, kAtOnce * sizeof(Stored)> bytes;
+  for (uint64_t done = 0; done < count; done += kAtOnce) {
+    const auto now = static_cast<size_t>(std::min(kAtOnce, count - done));
+    from.readAt(offset + done * sizeof(Stored), std::span(bytes).first(now * sizeof(Stored)));
+    convertStored<Stored>(bytes.data(), now, swap, to + done);
+  }
 }
 
 /// A bounded pool of open input files, most recently used first. Thread-safe.
