@@ -22,6 +22,7 @@
 #include <list>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
@@ -151,6 +152,9 @@ class PooledFile {
   std::filesystem::path path_;
   uint64_t size_ = 0;
 };
+
+/// The first `most` bytes of a file, or as many as it has. Throws Error if reading fails.
+std::string beginningOf(const InputFile& file, size_t most);
 
 /// Whether the path `named`, which is relative to `folder` unless it is absolute, lies outside of that folder.
 /// Symbolic links are the user's own and not looked at.
