@@ -23,14 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kManifest = "manifest.json";
 
-std::optional<FileInfo> fileNamed(const Manifest& manifest, const std::string& name) {
-  for (const FileInfo& file : manifest.files)
-    if (file.name == name) return file;
-  return std::nullopt;
-}
-
 bool sameFile(const Manifest& a, const Manifest& b, const std::string& name) {
-  const auto of_a = fileNamed(a, name), of_b = fileNamed(b, name);
+  const FileInfo *const of_a = a.file(name), *const of_b = b.file(name);
   return of_a && of_b && of_a->size == of_b->size && of_a->checksum == of_b->checksum;
 }
 
@@ -157,7 +151,7 @@ class StepMove {
                 base.path() / fmt::format("var.{}.{}.bin", variable.number, number));
     }
     std::vector<FileInfo> others;
-    if (const auto faces = fileNamed(from_.seriesManifest(), facesFileOfStep(number_))) {
+    if (const FileInfo* const faces = from_.seriesManifest().file(facesFileOfStep(number_))) {
       others.push_back({facesFileOfStep(number), faces->size, faces->checksum});
       names.add(cacheFile(from_.cachePath(), faces->name), lock_.cache() / others[0].name);
     }

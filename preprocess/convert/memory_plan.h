@@ -31,7 +31,7 @@ struct TestLimits {
 
 struct MemoryPlan {
   uint64_t cap_bytes = 0;       // limit of the process
-  uint64_t slab_bytes = 0;      // each of two slabs; also a row, where a source reads whole rows
+  uint64_t slab_bytes = 0;      // of each of two slabs; also of a row, where a source reads whole rows
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
   uint64_t overlap_bytes = 0;       // the points by which overlaps of blocks are found
@@ -72,6 +72,7 @@ struct MemoryPlan {
   /// KiB. Also leaves memory for the index of very many samples. Throws Error that names a sufficient limit
   /// if there is none left.
   void suit(uint64_t samples, size_t variables);
+  /// Lowers what `limits` sets.
   void limitTo(const TestLimits& limits, size_t variables);
   /// Limits the size of a bucket to `splats`, if it is larger.
   void limitBuckets(uint64_t splats, size_t variables);

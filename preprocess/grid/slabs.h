@@ -74,13 +74,13 @@ struct LoadedSlab {
   BlankCounts blanked;
 };
 
-/// One of `count` parts of the slabs of a grid, about as many in each, next to one another.
+/// One of `count` shares of the slabs of a grid: consecutive slabs, about as many in each share.
 struct SlabShare {
   unsigned index = 0, count = 1;
   bool whole_rows = false;  // all parts of a row are in one share
 };
 
-/// How large slabs are, and how many threads read them. One more slab than these is in memory.
+/// How large slabs are, and how many threads read them. In memory is one slab more than there are threads.
 struct SlabBuffers {
   SlabBuffers(uint64_t bytes, unsigned reading_threads = 1)
       : slab_bytes(bytes), readers(reading_threads) {}  // implicit
@@ -89,7 +89,8 @@ struct SlabBuffers {
   unsigned readers;
 };
 
-/// Reads all slabs of a grid, or a share of them, ahead, and gives them in order. `reader` must outlive it.
+/// Reads all slabs of a grid, or a share of them, ahead of the caller, who gets them in order. `reader` must
+/// outlive it.
 class SlabStream {
  public:
   SlabStream(const NodeReader& reader, const SlabBuffers& buffers, Halo halo, const SlabShare& share = {});

@@ -61,10 +61,10 @@ struct FrameRegion {
 
 /// Divides a picture into regions that are drawn one after the other, where the memory of the sweep cannot
 /// hold a layer of the whole cut (sweep_buffer.h). Where ranks draw a picture together, each divides its own
-/// tiles. A region is a rectangle of whole tiles of the painters (except where a rank's tiles end), whose
-/// layer is as much smaller as the region is. A brick on a border between regions is prepared for each of
-/// them; without regions, one that reaches through several slabs of depth would be prepared for each slab,
-/// which are many more: a brick is deep compared with a slab, and small compared with the picture.
+/// tiles. A region is a rectangle of whole tiles of the painters (except where a rank's tiles end); its layer
+/// is smaller as it is. Without regions the picture would be drawn in slabs of depth, and a brick prepared
+/// again for each slab that it reaches through. With them it is prepared again for each region that it
+/// touches, which are fewer: a brick is deep compared with a slab, and small compared with the picture.
 ///
 /// The number of regions is the one with the least estimated work. If a layer is larger than estimated, its
 /// region is drawn in slabs. There is one region at least; together they have the plan's tiles, each once.
@@ -73,8 +73,8 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
                                       size_t sweep_splats, uint32_t least = 1);
 inline constexpr uint32_t kMaxRegions = 64;
 
-/// A part of the cut in a region: how many of its splats are there, and their depth keys, which are taken to
-/// lie evenly in between.
+/// A part of the cut in a region: its depth keys there, over which its splats are taken to be spread evenly,
+/// and their number.
 struct PartInRegion {
   KeyRange keys;
   double splats = 0;   // in the region

@@ -48,7 +48,7 @@ enum class Classification { kPixel, kFlat };  // flat: one colour and extinction
 
 /// How a frame looks, and which resources it may use.
 struct FrameOptions {
-  ImageSize size;
+  ImageSize size;  // pixels
   Classification classification = Classification::kPixel;
   double lod_pixels = 1;               // pixels of error allowed, by weight (errorWeight()); 0: finest level
   std::optional<uint64_t> max_splats;  // splat limit; the largest screen error is refined first
@@ -64,12 +64,12 @@ struct FrameOptions {
   double low_pass_px2 = kLowPass;  // λ: added to the diagonal of S₂ (DESIGN.md, "Projection"), px²
   unsigned threads = 0;            // that compute at a time; 0: one per core
   uint64_t memory_bytes = 512 << 20;
-  // The memory of a graphics card for bricks that stay there, and for what they are drawn as. None: three quarters of what
-  // the card has free. 0: all splats are projected by the processor.
+  // The memory of a graphics card for bricks that stay there, and for their projected splats. None: three
+  // quarters of what the card has free. 0: the processor projects all splats.
   std::optional<uint64_t> card_memory_bytes;
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
-  PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;
+  PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;  // of bricks from the disk
   /// The processes that draw the picture together, each some of its tiles; null: this process alone.
   Ranks* ranks = nullptr;
   std::stop_token stop;  // ends the drawing with Interrupted

@@ -58,8 +58,8 @@ struct SamplingWork;
 /// Keeps the surfaces' memory from picture to picture.
 class LayerDrawer {
  public:
-  /// Gives the splats of some bricks to whoever samples them, and returns once all are sampled. Those of other scalars than the picture's
-  /// cost it the bricks that are kept, since they take their memory.
+  /// Gives the splats of some bricks to whoever samples them, and returns once all are sampled. Splats of other
+  /// scalars than the picture's take the memory of the bricks that are kept, which are then read again.
   using Sample = std::function<void(const SamplingWork& work)>;
 
   /// The cache and the planner must outlive it.
@@ -81,9 +81,9 @@ class LayerDrawer {
   /// The cache is at another step.
   void stepChanged() { iso_meshes_.clear(); }
 
-  /// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles,
-  /// samples of slices and of surfaces, and a layer and a half a pixel with a window behind it. The same for
-  /// all pictures of one size.
+  /// The memory, in bytes, that a scene takes, estimated: its meshes, their vertices on the screen and their
+  /// triangles in tiles, samples of slices and of surfaces, and a layer and a half a pixel with a window behind
+  /// it. The same for all pictures of one size.
   uint64_t bytes(const FrameOptions& options) const;
 
  private:

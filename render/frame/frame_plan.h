@@ -104,8 +104,8 @@ class FramePlanner {
   /// lies in the tiles of others. Nothing is left out if `keep_going`. All ranks have to call it.
   void share(FramePlan& plan, const FrameOptions& options) const;
 
-  /// Puts the layers of its scene into a plan. What is behind opaque ones everywhere is left out, unless
-  /// `keep_going`; all is without a volume.
+  /// Puts the layers of its scene into a plan. Leaves out the parts that lie behind opaque layers at all of
+  /// their pixels, unless `keep_going`; without a volume, all parts.
   void addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers> layers,
                  const FrameOptions& options) const;
 
@@ -152,7 +152,7 @@ class FramePlanner {
   std::vector<ValueBounds> subtrees_;
   std::vector<ValueBounds> colour_subtrees_;  // of the scalar of the colours, if there is one
 
-  /// The last ones, which cost much.
+  /// The percentiles of the last picture, which take long to find.
   struct Gradients {
     glm::dvec3 scale{1.0};
     std::unique_ptr<const GradientPercentiles> percentiles;
@@ -186,9 +186,9 @@ struct VoxelLoss {
 /// longer than 1/48 of the data count whole: in so few, borders are most of the picture.
 double errorWeight(const VoxelLoss& loss, double least);
 
-/// The length, stretched, over which rays pass a lattice in step: voxels of the length `voxel` along the
-/// axes, seen by `view` anywhere in the brick's box. At most `whole`, the data's length. For a ray with the
-/// direction d it is voxel / (π |d_i|), i the axis that d is nearest to being at right angles to.
+/// The stretched length over which rays pass the voxels of a lattice at the same place: voxels of the length
+/// `voxel` along the axes, seen by `view` anywhere in the brick's box. At most `whole`, the data's length. For a
+/// ray with the direction d it is voxel / (π |d_i|), where |d_i| is the smallest of d's components.
 double lengthInStep(const Brick& brick, const CutView& view, double voxel, double whole);
 
 }  // namespace curvisplat

@@ -42,7 +42,7 @@ struct FrameWork {
   SplatExchange* exchange = nullptr;  // among the ranks that draw the picture together; null: there is one
 };
 
-/// The same for what is found from splats before the picture is drawn: slices and isosurfaces.
+/// The inputs of a pass over splats before the picture is drawn, which finds slices and isosurfaces.
 struct SamplingWork {
   const CacheReader& cache;
   std::span<const BrickPart> parts;
@@ -125,7 +125,7 @@ class FrameWorkers {
   const FrameWork* work_ = nullptr;
   const TileSet* tiles_ = nullptr;
   std::vector<Seen> seen_;         // [part of the frame]; each is one worker's at a time
-  std::vector<uint8_t> prepared_;  // [part of all ranks' frame], for others, too
+  std::vector<uint8_t> prepared_;  // [part of all ranks' frame] 1: this rank has prepared it, for any rank
   std::atomic<uint64_t> parts_seen_ = 0;
   std::atomic<uint64_t> next_ = 0;  // sequence number of the slab's first part that no worker has taken
   Mutex failing_;

@@ -288,13 +288,11 @@ void checkSize(const fs::path& path, uint64_t bytes, const FileInfo& info) {
 }
 
 const FileInfo& checkFile(const fs::path& path, uint64_t bytes, const Manifest& manifest) {
-  const std::string name = path.filename().string();
-  for (const FileInfo& info : manifest.files) {
-    if (info.name != name) continue;
-    checkSize(path, bytes, info);
-    return info;
-  }
-  throw Error("{}: is not listed in the manifest; the cache is damaged: convert again", path.string());
+  const FileInfo* const info = manifest.file(path.filename().string());
+  if (!info)
+    throw Error("{}: is not listed in the manifest; the cache is damaged: convert again", path.string());
+  checkSize(path, bytes, *info);
+  return *info;
 }
 
 const FileInfo& checkFile(const InputFile& file, const Manifest& manifest) {

@@ -17,8 +17,9 @@ namespace curvisplat {
 /// The right to change a cache, until the object is destroyed.
 class CacheLock {
  public:
-  /// Throws Error if `cache` has no manifest that can be opened for writing, if it is one of Manifest::own_blanks, whose
-  /// checksum the whole cache has, or if another program holds the lock. Removes the old manifest if a program was killed just after it had put a new one in its place.
+  /// Throws Error if `cache` has no manifest that can be opened for writing, if it is one of
+  /// Manifest::own_blanks, whose checksum the whole cache has, or if another program holds the lock. Removes
+  /// the old manifest if a program was killed just after it had put a new one in its place.
   explicit CacheLock(const std::filesystem::path& cache);
   /// Locks a set of Manifest::own_blanks of a cache that is locked.
   CacheLock(const CacheLock& whole, size_t set);

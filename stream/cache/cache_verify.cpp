@@ -256,10 +256,10 @@ class Verifier {
                     file.size());
       std::vector<std::byte> bytes(file.size());
       file.readAt(0, std::span(bytes));
-      for (const FileInfo& info : reader_.manifest().files)
-        if (info.name == "bricks.vdb" && info.checksum != checksumOf(bytes))
-          return find("{}: has a wrong checksum (found {:016x}, expected {:016x})", path.string(),
-                      checksumOf(bytes), info.checksum);
+      const FileInfo* const info = reader_.manifest().file("bricks.vdb");
+      if (info && info->checksum != checksumOf(bytes))
+        return find("{}: has a wrong checksum (found {:016x}, expected {:016x})", path.string(),
+                    checksumOf(bytes), info->checksum);
       const auto [difference, not_compared] = compareBrickGrids(bytes, reader_.manifest().root, bricks_);
       if (!difference.empty()) find("{}: {}", path.string(), difference);
       if (!not_compared.empty())

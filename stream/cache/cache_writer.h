@@ -52,28 +52,28 @@ class CacheWriter {
   /// threads may read at the same time, while nothing is appended.
   BrickSplats readBack(uint64_t id) const;
 
-  /// The sums for the histograms of the variables, of which finish() writes those to which every leaf was
-  /// added. Any thread may add.
+  /// The sums of the variables' histograms. finish() writes a histogram if every leaf was added to it. Any
+  /// thread may add.
   HistogramSums& histograms();
 
   /// The record that append() has noted of a brick.
   AppendedBrick appended(uint64_t id) const;
-  /// Syncs the streams and the log: what was appended outlasts a crash of the machine. Not while something
-  /// is appended.
+  /// Syncs the streams and the log, so that what was appended outlasts a crash of the machine. Nothing may be
+  /// appended meanwhile.
   void sync();
   /// Syncs and closes the streams and the log, so that another machine may read them. Only readBack() may
   /// follow.
   void closeStreams();
 
-  /// Sets the offsets of bricks whose streams other processes write, in place of append(), for all of them,
-  /// which must come in the same order. Nothing may have been appended. The streams have to be in the files
-  /// before finish().
+  /// Takes the place of append() where other processes write the streams: sets the offsets of all bricks,
+  /// which must be in the order of append(). Nothing may have been appended. The streams have to be in the
+  /// files before finish().
   void reserve(std::vector<AppendedBrick>& bricks);
 
   /// Sorts the records by level and Morton order and links parents and children. Writes bricks.bin, the
   /// variables' tables, bricks.vdb and the manifest, whose root, counts, levels, volume and files it fills
-  /// in; files that the manifest lists already stand in the folder, and stay listed. Renames the folder to
-  /// its final name. Returns the manifest as written.
+  /// in. Files that `manifest` lists must be in the folder; they stay listed. Renames the folder to its final
+  /// name. Returns the manifest as written.
   Manifest finish(Manifest manifest);
 
  private:

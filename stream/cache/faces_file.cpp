@@ -231,10 +231,9 @@ FileInfo FacesWriter::finish(std::span<const GridFace> faces, std::span<const st
 
 std::shared_ptr<const FacesReader> FacesReader::open(const std::filesystem::path& folder,
                                                      const Manifest& manifest, const std::string& name) {
-  for (const FileInfo& info : manifest.files)
-    if (info.name == name)
-      return std::shared_ptr<const FacesReader>(new FacesReader(cacheFile(folder, name.c_str()), info));
-  return nullptr;
+  const FileInfo* const info = manifest.file(name);
+  if (!info) return nullptr;
+  return std::shared_ptr<const FacesReader>(new FacesReader(cacheFile(folder, name.c_str()), *info));
 }
 
 FacesReader::FacesReader(const std::filesystem::path& path, const FileInfo& info) : file_(path) {

@@ -230,10 +230,25 @@ void checkVersion(uint64_t version, const std::filesystem::path& path) {
         path.string(), version, kOldestVersion);
 }
 
+/// The element of a list that has the name, or null.
+template <class Element>
+const Element* elementNamed(const std::vector<Element>& list, std::string_view name) {
+  const auto found = std::ranges::find(list, name, &Element::name);
+  return found == list.end() ? nullptr : &*found;
+}
+
 }  // namespace
 
 bool Manifest::isMesh() const {
   return blocks.size() == 1 && blocks[0].nj == 1 && blocks[0].name == (cells ? "cells" : "points");
+}
+
+const VariableInfo* Manifest::variable(std::string_view name) const {
+  return elementNamed(variables, name);
+}
+
+const FileInfo* Manifest::file(std::string_view name) const {
+  return elementNamed(files, name);
 }
 
 bool Manifest::hasFeature(const char* feature) const {

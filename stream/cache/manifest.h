@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stream/base/error.h"
@@ -136,6 +137,9 @@ struct Manifest {
   std::vector<OwnBlanks> own_blanks;  // empty without kOwnBlanks
   std::vector<FileInfo> files;        // all files of the cache's folder but the manifest; none of subfolders
 
+  /// The variable, the file of that name; null if the cache has none. The manifest keeps it.
+  const VariableInfo* variable(std::string_view name) const;
+  const FileInfo* file(std::string_view name) const;
   bool hasFeature(const char* feature) const;
   /// Whether the grid is unstructured: its samples are one row, or two of cells that are two splats each (FORMAT.md).
   bool isMesh() const;

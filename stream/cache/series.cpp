@@ -103,8 +103,7 @@ class StepsReader {
 
  private:
   const FileInfo& listed() const {
-    for (const FileInfo& info : manifest_.files)
-      if (info.name == kStepsFileName) return info;
+    if (const FileInfo* const info = manifest_.file(kStepsFileName)) return *info;
     throw Error("{}: is not listed in the manifest; the cache is damaged: convert again", path_.string());
   }
 
@@ -153,12 +152,10 @@ Series singleStep(const Manifest& manifest) {
   SeriesStep step{manifest.steps.front().time, 0, 0, manifest.grid_checksum.value_or(0), {}};
   for (const VariableInfo& variable : manifest.variables) {
     StepValues values{variable.min, variable.max, 0, 0};
-    const std::string name = fmt::format("var.{}.bin", variable.number);
-    for (const FileInfo& file : manifest.files)
-      if (file.name == name) {
-        values.size = file.size;
-        values.checksum = file.checksum;
-      }
+    if (const FileInfo* const file = manifest.file(fmt::format("var.{}.bin", variable.number))) {
+      values.size = file->size;
+      values.checksum = file->checksum;
+    }
     step.values.push_back(values);
   }
   Series series;
@@ -253,9 +250,9 @@ void cutAppended(const fs::path& cache, const Manifest& manifest) noexcept {
   try {
     const fs::path path = cacheFile(cache, kStepsFileName);
     if (!manifest.hasFeature(kSteps)) removeAll(path);
-    for (const FileInfo& file : manifest.files)
-      if (file.name == kStepsFileName && fs::file_size(path) > file.size)
-        OutputFile(path, Caching::kPages, OutputFile::Existing::kKeep).truncate(file.size);
+    const FileInfo* const file = manifest.file(kStepsFileName);
+    if (file && fs::file_size(path) > file->size)
+      OutputFile(path, Caching::kPages, OutputFile::Existing::kKeep).truncate(file->size);
   } catch (...) {
     // The next addition cuts it.
   }

@@ -93,11 +93,12 @@ FileInfo appendStep(const std::filesystem::path& cache, const Manifest& manifest
 /// The manifest's entry for steps.bin.
 FileInfo stepsFileOf(const Series& series, size_t variables);
 
-/// The checksum of what steps.bin has, or would have, of the first step: the same however many steps are added.
+/// The checksum of the part of steps.bin that describes the first step, which further steps do not change. A
+/// cache without steps.bin has the checksum that the file would have.
 uint64_t firstStepChecksum(const Series& series);
 
-/// Cuts off what appendStep() has appended and no manifest lists. `manifest`: that of the cache. If that
-/// fails, the bytes stay there without harm.
+/// Cuts off the records that appendStep() has appended and `manifest`, the cache's, does not list. If that
+/// fails, they stay there without harm.
 void cutAppended(const std::filesystem::path& cache, const Manifest& manifest) noexcept;
 
 /// An open file of values: of one variable at one step.

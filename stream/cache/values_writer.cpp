@@ -61,10 +61,8 @@ void VariableWriter::removeLeftovers() const {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(lock_->cache(), ignored)) {
     const std::string name = entry.path().filename().string();
-    const bool is_known = std::any_of(manifest_.files.begin(), manifest_.files.end(),
-                                      [&](const FileInfo& file) { return file.name == name; });
     const bool was_new = name.starts_with("var.") || isFacesFile(name) || name.ends_with(kPartSuffix);
-    if (!is_known && was_new && isCacheFile(entry)) removeAll(entry.path());
+    if (!manifest_.file(name) && was_new && isCacheFile(entry)) removeAll(entry.path());
   }
 }
 
@@ -245,11 +243,9 @@ void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewS
                   checksumOf(std::as_bytes(std::span(text))),
                   manifest.grid_checksum.value_or(0),
                   {}};
-  for (const VariableInfo& variable : manifest.variables) {
-    const std::string name = fmt::format("var.{}.bin", variable.number);
-    for (const FileInfo& file : manifest.files)
-      if (file.name == name) step.values.push_back({0, 0, file.size, file.checksum});
-  }
+  for (const VariableInfo& variable : manifest.variables)
+    if (const FileInfo* const file = manifest.file(fmt::format("var.{}.bin", variable.number)))
+      step.values.push_back({0, 0, file->size, file->checksum});
   CURVISPLAT_CHECK_OP(step.values.size(), ==, cache.seriesManifest().variables.size());
   lock.requireStillThere();
   syncDirectory(lock.cache());

@@ -33,8 +33,8 @@ class ValuesWriter {
   /// Appends a brick's streams, one per variable. Each brick comes once, in the order of conversion.
   virtual void append(uint32_t brick, std::span<const EncodedValues> values) = 0;
 
-  /// The sums for the histograms of the variables, which are written if every leaf was added. Any thread may
-  /// add.
+  /// The sums of the variables' histograms. A histogram is written if every leaf was added to it. Any thread
+  /// may add.
   HistogramSums& histograms() { return histograms_; }
 
  private:
@@ -57,7 +57,8 @@ class VariableWriter : public ValuesWriter {
 
   /// The numbers of the new variables.
   std::vector<uint32_t> numbers() const;
-  /// A further file of the cache's folder, complete: finish() lists it; removed unless that succeeds.
+  /// Adds a file that is complete in the cache's folder. finish() lists it; the destructor removes it unless
+  /// finish() has succeeded.
   void addFile(const FileInfo& file) { others_.push_back(file); }
 
   /// Writes the tables, syncs, and puts the files and the manifest into place. Adds those `sources` to the
@@ -109,7 +110,7 @@ class StepWriter : public ValuesWriter {
 
   void append(uint32_t brick, std::span<const EncodedValues> values) override;
 
-  /// A further file of the step, which is complete in the cache's folder.
+  /// Adds a file of the step that is complete in the cache's folder. finish() lists it.
   void addFile(const FileInfo& file) { others_.push_back(file); }
 
   /// Writes the tables, syncs, and puts files and manifest into place. Returns the new files. After an Error

@@ -134,8 +134,8 @@ class BrickCache {
 
   bool contains(BrickKey brick) const;
 
-  /// Declares that the values of the bricks here are of an earlier step. Their geometry stays, but merged ones are removed:
-  /// what they were merged from is gone. Nothing may be pinned.
+  /// Says that the values of all kept bricks are of an earlier step. Their geometry stays; merged bricks are
+  /// removed, since the splats that they were merged from are gone. Nothing may be pinned.
   void stepChanged();
   /// Whether the brick is here with values of an earlier step.
   bool isStale(BrickKey brick) const;

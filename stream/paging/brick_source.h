@@ -32,7 +32,7 @@ namespace curvisplat {
 struct FetchStatistics {
   double read_s = 0;  // with a read under way
   double verify_s = 0, decode_s = 0;
-  double read_waited_s = 0;     // workers for reads
+  double read_waited_s = 0;     // that workers waited for reads
   double mean_queue_depth = 0;  // while a read was under way
   uint64_t bytes_read = 0, read_requests = 0;
   uint64_t bricks_cached = 0, bricks_read = 0;
@@ -63,7 +63,7 @@ class BrickSource {
   /// The splats of a part. The spans are valid until the next call with the same scratch, and as long as
   /// `pin`.
   struct Splats {
-    GeometryArrays<const float> geometry;  // from the minimum corner of `cell`
+    GeometryArrays<const float> geometry;  // world units; positions from the lowest corner of `cell`
     VariableArrays<const float> values;
     SplatRanges ranges;  // of the part
     Cell cell;
@@ -88,8 +88,8 @@ class BrickSource {
   /// all ancestors are damaged. Throws Error if the disk fails.
   Splats standIn(const BrickPart& part, Scratch& scratch) const;
 
-  /// The cache is at another step of the same geometry. The geometry of decoded bricks is kept; their values are
-  /// decoded anew when they are taken. Nobody may be in fetch() or prefetchNext() any more. Throws Error.
+  /// Says that the cache is at another step of the same geometry. The geometry of decoded bricks is kept; their
+  /// values are decoded anew when they are fetched. No thread may be in fetch() or prefetchNext(). Throws Error.
   void stepChanged();
 
   /// Begins to fill the cache with the bricks of `parts`, in their order, as far as they fit.

@@ -1,6 +1,6 @@
-// Merges the layers of thin cells in a decoded leaf brick: splats that lie in one voxel and have about the
-// same colour become one, by their moments (DESIGN.md, "Thin cells"), if they lie above one another: their
-// length and width stay what they were, and only their thickness grows, to a voxel's length at most.
+// Merges the layers of thin cells in a decoded leaf brick (DESIGN.md, "Thin cells"). Splats that lie above one
+// another in one voxel, and have about the same colour, become one splat with their moments. It is as long and
+// wide as they are; only its thickness grows, to a voxel's length at most.
 //
 // Merging takes about 60 ns a splat, less than a tenth of what drawing one takes. It happens when a picture
 // fetches a brick, since a level of such splats would add half to a cache's bytes. A LayerMerger belongs to
@@ -40,9 +40,9 @@ class LayerMerger {
   static constexpr uint64_t kBytes =
       uint64_t{kMaxBrickSplats} * (2 * sizeof(uint64_t) + 4 * sizeof(uint32_t));
 
-  /// Merges in place; what is left is in the order of the first splat of each. `largest_radius`: Brick's, within
-  /// which the supports of merged splats stay. `second`: null unless there is a second scalar. Cells at
-  /// borders are not merged.
+  /// Merges in place. Each merged splat takes the place of its first one. `largest_radius`: Brick's, in world
+  /// units, within which the supports of merged splats stay. `second`: null unless there is a second scalar.
+  /// Cells at borders are not merged.
   void merge(const LayerMerging& merging, double largest_radius, SplatGeometry& geometry,
              SplatVariable& values, SplatVariable* second);
 

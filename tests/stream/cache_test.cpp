@@ -32,6 +32,10 @@ TEST(Cache, GivesBackWhatWasAppended) {
   ASSERT_EQ(reader.bricks().size(), 10u);
   EXPECT_EQ(reader.manifest().levels, 2u);
   EXPECT_EQ(reader.manifest().title, "small");
+  EXPECT_EQ(reader.manifest().variable("mach"), &reader.manifest().variables[1]);
+  EXPECT_EQ(reader.manifest().variable("mac"), nullptr);
+  ASSERT_NE(reader.manifest().file("geometry.bin"), nullptr);
+  EXPECT_EQ(reader.manifest().file("geometry.bin")->size, fs::file_size(path / "geometry.bin"));
   EXPECT_EQ(reader.variableNamed(""), 0u);
   EXPECT_EQ(reader.variableNamed("mach"), 1u);
   EXPECT_EQ(reader.variableNamed("density [kg/m3]"), 0u);

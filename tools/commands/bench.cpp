@@ -18,6 +18,7 @@
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "stream/base/threads.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
@@ -177,12 +178,12 @@ void benchRanks(const BenchArguments& arguments) {
   const Camera camera =
       chooseCameraMotion(arguments.camera, {manifest.lower, manifest.upper}, options.size).camera(0);
   const RankSimulation simulated = simulateRanks({cache, variable, function, options}, camera, counts);
-  printLine("{}: {} samples in {} bricks; scalar {}", arguments.cache.string(), manifest.nodes,
-            manifest.bricks, manifest.variables[variable].name);
+  printLine("{}: {} samples in {}; scalar {}", arguments.cache.string(), manifest.nodes,
+            countText(manifest.bricks, "brick"), manifest.variables[variable].name);
   printSection(
-      fmt::format("Simulated: one picture of {}x{} pixels at {:g} px, {} splats in {} parts of bricks",
-                  options.size.width, options.size.height, options.lod_pixels,
-                  shortCount(static_cast<double>(simulated.splats)), simulated.parts),
+      fmt::format("Simulated: one picture of {}x{} pixels at {:g} px, {} splats in {}", options.size.width,
+                  options.size.height, options.lod_pixels, shortCount(static_cast<double>(simulated.splats)),
+                  countText(simulated.parts, "brick")),
       rankTable(simulated));
   Json json = reportOf(arguments, Machine::here(cache.path()), {});
   json["ranks"] = toJson(simulated);
@@ -218,8 +219,8 @@ void benchCache(const BenchArguments& arguments) {
   const Machine machine = Machine::here(cache.path());
   const Effort effort = arguments.quick ? kQuick : Effort{};
 
-  printLine("{}: {} samples as {} splats in {} bricks; scalar {}", arguments.cache.string(), manifest.nodes,
-            manifest.splats, manifest.bricks, info.name);
+  printLine("{}: {} samples as {} splats in {}; scalar {}", arguments.cache.string(), manifest.nodes,
+            manifest.splats, countText(manifest.bricks, "brick"), info.name);
   printMachine(machine);
   std::fflush(stdout);
   Measurements measurements;

@@ -136,7 +136,8 @@ void checkCameraArguments(const CameraArguments& arguments) {
         "--path {}: its key frames place the camera; remove --view, --position, --look-at, --parallel-scale "
         "and --view-angle",
         arguments.path.string());
-  if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
+  if (arguments.frames && !arguments.moves())
+    throw UsageError("--frames needs --orbit, --path, or --steps with --interpolate");
 }
 
 namespace {

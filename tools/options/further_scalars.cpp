@@ -139,8 +139,8 @@ std::unique_ptr<DataSource> openStepOf(const CacheReader& reader, ConvertArgumen
 /// Whether `after` has the values of `before`, as far as ranges and times tell.
 bool hasSameValues(const Manifest& after, const Manifest& before) {
   const auto is_in = [&](const VariableInfo& one) {
-    const auto same = std::ranges::find(after.variables, one.name, &VariableInfo::name);
-    return same != after.variables.end() && same->min == one.min && same->max == one.max;
+    const VariableInfo* const same = after.variable(one.name);
+    return same && same->min == one.min && same->max == one.max;
   };
   return isSameStep(after, before) && after.steps.front().time == before.steps.front().time &&
          std::ranges::all_of(before.variables, is_in);

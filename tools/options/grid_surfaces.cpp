@@ -360,9 +360,7 @@ std::vector<GridSurface> gridSurfacesNamed(const std::vector<WantedFaces>& wante
 
 std::vector<std::string> faceNamesOf(const CacheReader& cache) {
   const auto faces = FacesReader::open(cache.path(), cache.manifest());
-  const std::vector<FileInfo>& files = cache.manifest().files;
-  const bool has_blanks = std::any_of(files.begin(), files.end(),
-                                      [](const FileInfo& file) { return file.name == kBlanksFileName; });
+  const bool has_blanks = cache.manifest().file(kBlanksFileName) != nullptr;
   if (!faces) return has_blanks ? std::vector<std::string>{kBlanks} : std::vector<std::string>{};
   std::vector<std::string> names, of_blocks;
   std::set<std::string> known;

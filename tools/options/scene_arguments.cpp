@@ -603,10 +603,8 @@ std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, 
   if (scene)
     for (const GridSurface& surface : scene->grid_surfaces) {
       if (!surface.function) continue;
-      const auto info = std::find_if(manifest.variables.begin(), manifest.variables.end(),
-                                     [&](const VariableInfo& of) { return of.name == surface_by; });
-      shown.push_back({surface.function.get(),
-                       info == manifest.variables.end() ? surface_by : scalarTitle(info->name, info->unit)});
+      const VariableInfo* const info = manifest.variable(surface_by);
+      shown.push_back({surface.function.get(), info ? scalarTitle(info->name, info->unit) : surface_by});
       break;
     }
   if (scene && !scene->curves.empty() && scene->curves.front().function)

@@ -377,8 +377,7 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, const FurtherScalars* furth
     ImGui::PushID(static_cast<int>(n));
     ImGui::Separator();
     const std::string name = fmt::format("isosurface {}", n + 1);
-    const auto& all = cache_.manifest().variables;
-    ImGui::BeginDisabled(std::ranges::find(all, one.scalar, &VariableInfo::name) == all.end());
+    ImGui::BeginDisabled(!cache_.manifest().variable(one.scalar));
     actions.changed |= eye(one.visible, name);
     ImGui::EndDisabled();
     ImGui::SameLine();
@@ -412,12 +411,11 @@ void SurfacePanel::chooseScalarOf(size_t number, const Isosurface& one, const Fu
 }
 
 void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelActions& actions) {
-  const std::vector<VariableInfo>& all = cache_.manifest().variables;
-  const auto info = std::ranges::find(all, one.scalar, &VariableInfo::name);
-  const double lowest = info == all.end() ? one.value : info->min;
-  const double highest = info == all.end() ? one.value : info->max;
+  const VariableInfo* const info = cache_.manifest().variable(one.scalar);
+  const double lowest = info ? info->min : one.value;
+  const double highest = info ? info->max : one.value;
   label("value");
-  ImGui::BeginDisabled(info == all.end());
+  ImGui::BeginDisabled(!info);
   if (slider("##value", one.value, lowest, highest, "%.5g", ImGuiSliderFlags_AlwaysClamp))
     actions.changed = true;
   ImGui::EndDisabled();

@@ -66,7 +66,7 @@ def page():
     for name, (title, files, scalar, _, options, source) in GALLERY.items():
         convert = shlex.join(["curvisplat", "convert", *files, "-o", f"{name}.splats", "--scalar", scalar]).replace("'", "")
         render = shlex.join(["curvisplat", "render", f"{name}.splats", "-o", f"{name}.png", "--size", f"{WIDTH}x{HEIGHT}", *options])
-        parts.append(f"\n## {title}\n\n![{title}](gallery_{name}.png)\n\n    {convert}\n    {render}\n\nThe grid: {source}.\n")
+        parts.append(f"\n## {title}\n\n![curvisplat, VTK](gallery_{name}.png)\n\n    {convert}\n    {render}\n\nThe grid: {source}.\n")
     return "".join(parts)
 
 

@@ -151,8 +151,8 @@ class FrameLoop {
   /// the loop, or UsageError (too little memory for this size, no faces at this step), which ends only the
   /// request.
   std::optional<ShownFrame> poll();
-  /// Says that the memory of the last picture taken is free, for requests that want one_at_a_time. No effect
-  /// otherwise.
+  /// Says that the memory of the last picture from poll() is free, for requests that are one_at_a_time. No
+  /// effect otherwise.
   void giveBack();
   /// Asks for the values of the newest request's picture, once that is shown. The next request() cancels
   /// this.
@@ -195,7 +195,7 @@ class FrameLoop {
   uint64_t newest_ GUARDED_BY(mutex_) = 0;  // number of the newest request
   std::stop_source drawing_ GUARDED_BY(mutex_);
   std::optional<ShownFrame> shown_ GUARDED_BY(mutex_);
-  bool in_use_ GUARDED_BY(mutex_) = false;  // the last picture taken, until giveBack()
+  bool in_use_ GUARDED_BY(mutex_) = false;  // the last picture from poll(), until giveBack()
   bool values_wanted_ GUARDED_BY(mutex_) = false;
   std::optional<ShownValues> values_ GUARDED_BY(mutex_);
   std::exception_ptr failure_ GUARDED_BY(mutex_);  // of the loop in kFailed, else of the last request

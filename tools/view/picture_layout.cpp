@@ -15,9 +15,8 @@ namespace curvisplat {
 namespace {
 
 std::string titleOf(const Manifest& manifest, const std::string& name) {
-  const auto info = std::find_if(manifest.variables.begin(), manifest.variables.end(),
-                                 [&](const VariableInfo& one) { return one.name == name; });
-  return info == manifest.variables.end() ? name : scalarTitle(info->name, info->unit);
+  const VariableInfo* const info = manifest.variable(name);
+  return info ? scalarTitle(info->name, info->unit) : name;
 }
 
 }  // namespace

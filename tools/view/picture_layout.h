@@ -45,7 +45,8 @@ ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize
 /// The box of the axes grid of data on a globe, found once a picture has that grid and kept for a cache.
 class GlobeGrid {
  public:
-  /// nullopt: the picture has no axes grid, or the data no degrees, or it cannot be read: the picture says so.
+  /// nullopt if the picture has no axes grid, or the data no longitudes and latitudes, or if they cannot be read,
+  /// which the picture says.
   const std::optional<AnnotatedScene::OnGlobe>& boxOf(const ViewState& state, const CacheReader& cache);
 
  private:
@@ -86,7 +87,7 @@ class PointProbe {
     std::optional<ProbeResult> found;  // nullopt: outside of the data
   };
 
-  /// Nothing happens if this was the newest question already, unless it is asked `again`.
+  /// Asks a question. No effect if it is the newest question already, unless `again`.
   void ask(const Question& question, bool again = false);
   /// An answer that has come since the last call. Throws what reading throws. Call it often: it also begins
   /// to answer the next question.

@@ -206,16 +206,10 @@ WorldBox boxFrom(const JsonField& fields) {
   return box;
 }
 
-const VariableInfo* find(const Manifest& manifest, const std::string& name) {
-  const auto found = std::find_if(manifest.variables.begin(), manifest.variables.end(),
-                                  [&](const VariableInfo& variable) { return variable.name == name; });
-  return found == manifest.variables.end() ? nullptr : &*found;
-}
-
 OpacityScalar opacityScalarFrom(const JsonField& fields, const std::filesystem::path& path,
                                 const Manifest& manifest, double opacity_unit) {
   const JsonField variable = fields.at("variable");
-  if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+  if (!manifest.variable(variable.text())) variable.fail("a scalar of the cache");
   return {variable.text(), functionFrom(fields, path, opacity_unit)};
 }
 
@@ -227,7 +221,7 @@ double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
 /// Puts the isosurfaces of one scalar into a scene that has those of the opacities' scalar, the first, without a name.
 void putIsosurfaces(const std::vector<Isosurface>& group, const ViewState& state, const Manifest& manifest,
                     SurfaceScene& scene) {
-  const VariableInfo* const variable = find(manifest, group.front().scalar);
+  const VariableInfo* const variable = manifest.variable(group.front().scalar);
   if (!variable) return;
   FurtherIsosurfaces put{static_cast<size_t>(variable - manifest.variables.data())};
   for (const Isosurface& one : group) {
@@ -244,7 +238,7 @@ void putIsosurfaces(const std::vector<Isosurface>& group, const ViewState& state
 
 /// Hides isosurfaces of scalars that the cache lacks.
 void hideOthers(std::vector<Isosurface>& isosurfaces, const Manifest& manifest) {
-  for (Isosurface& one : isosurfaces) one.visible &= find(manifest, one.scalar) != nullptr;
+  for (Isosurface& one : isosurfaces) one.visible &= manifest.variable(one.scalar) != nullptr;
 }
 
 /// States of earlier versions lack some.
@@ -265,7 +259,7 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
                              visibleFrom(named)});
   if (const auto by = fields.find("faces_by")) {
     const JsonField variable = by->at("variable");
-    if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+    if (!manifest.variable(variable.text())) variable.fail("a scalar of the cache");
     state.faces_by =
         FacesScalar{variable.text(), functionFrom(*by, path, defaultOpacityUnit(manifest, state.scale))};
   }
@@ -316,8 +310,7 @@ AskedDifferences ViewState::askedDifferences(const CacheReader& cache) const {
   if (faces_by && std::ranges::any_of(faces, &NamedFaces::visible))
     asked.axes.push_back({cache.variableNamed(faces_by->variable), faces_by->function.axis()});
   for (const std::vector<Isosurface>& group : drawnIsosurfaces()) {
-    const auto& all = cache.manifest().variables;
-    if (std::ranges::find(all, group.front().scalar, &VariableInfo::name) == all.end()) continue;
+    if (!cache.manifest().variable(group.front().scalar)) continue;
     AskedIsovalues& values = asked.isosurfaces.emplace_back();
     values.variable = cache.variableNamed(group.front().scalar);
     for (const Isosurface& one : group) values.values.push_back(one.value);
@@ -482,7 +475,7 @@ void loadSurfaces(ViewState& state) {
 }
 
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name) {
-  const VariableInfo* const variable = find(manifest, name);
+  const VariableInfo* const variable = manifest.variable(name);
   if (!variable) {
     std::string names;
     for (const VariableInfo& one : manifest.variables) names += (names.empty() ? "" : ", ") + one.name;
@@ -493,10 +486,10 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
 }
 
 void leaveOtherScalars(ViewState& state, const Manifest& manifest, const std::string& shown) {
-  if (state.opacity_by && !find(manifest, state.opacity_by->variable)) state.opacity_by.reset();
-  if (state.faces_by && !find(manifest, state.faces_by->variable)) state.faces_by.reset();
+  if (state.opacity_by && !manifest.variable(state.opacity_by->variable)) state.opacity_by.reset();
+  if (state.faces_by && !manifest.variable(state.faces_by->variable)) state.faces_by.reset();
   hideOthers(state.isosurfaces, manifest);
-  if (!find(manifest, state.variable)) chooseVariable(state, manifest, shown);
+  if (!manifest.variable(state.variable)) chooseVariable(state, manifest, shown);
 }
 
 std::string toJson(const ViewState& state) {
@@ -543,7 +536,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   if (const JsonField version = fields.at("curvisplat_view"); version.json() != 1)
     version.fail("1, the only version this program reads");
   const JsonField variable = fields.at("variable"), scale = fields.at("scale");
-  if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+  if (!manifest.variable(variable.text())) variable.fail("a scalar of the cache");
   const glm::dvec3 factors = scale.point(kMaxScale);
   if (!(std::min({factors.x, factors.y, factors.z}) >= kMinScale))
     scale.fail("three numbers between 1e-6 and 1e6");

@@ -49,9 +49,8 @@ std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& 
 }
 
 bool hasScalarsOf(const Manifest& manifest, const Manifest& other) {
-  return std::ranges::all_of(other.variables, [&](const VariableInfo& one) {
-    return std::ranges::find(manifest.variables, one.name, &VariableInfo::name) != manifest.variables.end();
-  });
+  return std::ranges::all_of(other.variables,
+                             [&](const VariableInfo& one) { return manifest.variable(one.name); });
 }
 
 /// [step]: whether the next one has its geometry.

@@ -468,7 +468,7 @@ void CacheView::chooseOpacityScalar(const std::string& name) {
 }
 
 void CacheView::useScalar(const WantedScalar& wanted) {
-  if (std::ranges::find(manifest().variables, wanted.name, &VariableInfo::name) == manifest().variables.end())
+  if (!manifest().variable(wanted.name))
     return say(
         fmt::format("{} has values at other samples: it is drawn by itself, as the scalar.", wanted.name));
   if (wanted.for_opacities) return chooseOpacityScalar(wanted.name);

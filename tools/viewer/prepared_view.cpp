@@ -59,10 +59,7 @@ std::vector<std::string> scalarsElsewhere(const CacheReader& cache) {
   std::vector<std::string> names = cache.wholePath() == cache.cachePath()
                                        ? cache.allScalars()
                                        : CacheReader(cache.wholePath()).allScalars();
-  std::erase_if(names, [&](const std::string& name) {
-    return std::ranges::find(cache.manifest().variables, name, &VariableInfo::name) !=
-           cache.manifest().variables.end();
-  });
+  std::erase_if(names, [&](const std::string& name) { return cache.manifest().variable(name); });
   return names;
 }
 

@@ -70,6 +70,12 @@ std::filesystem::path existingFile(std::string_view who, const std::filesystem::
   throw Error("{} names {}, which does not exist", who, path.string());
 }
 
+std::string beginningOf(const InputFile& file, size_t most) {
+  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), most)), '\0');
+  file.readAt(0, std::span(begin.data(), begin.size()));
+  return begin;
+}
+
 FileBytes::FileBytes(std::shared_ptr<const PooledFile> file, uint64_t begin, uint64_t end)
     : file_(std::move(file)),
       begin_(std::min(begin, file_->size())),

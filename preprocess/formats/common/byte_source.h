@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -21,6 +22,7 @@
 #include <list>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
@@ -102,6 +104,19 @@ void convertStored(const std::byte* from, size_t count, bool swap, Value* to) {
       to[n] = convertedTo<Value>(loadStored<Stored>(from + n * sizeof(Stored), false));
 }
 
+/// Reads `count` numbers of the type Stored from `offset` on, and converts them. `from`: an InputFile, a
+/// PooledFile or a ByteSource. Holds 16 KiB of bytes at a time. Throws Error as from.readAt() does.
+template <typename Stored, typename Source, typename Value>
+void readStored(const Source& from, uint64_t offset, uint64_t count, bool swap, Value* to) {
+  constexpr uint64_t kAtOnce = (16 << 10) / sizeof(Stored);
+  std::array<std::byte, kAtOnce * sizeof(Stored)> bytes;
+  for (uint64_t done = 0; done < count; done += kAtOnce) {
+    const auto now = static_cast<size_t>(std::min(kAtOnce, count - done));
+    from.readAt(offset + done * sizeof(Stored), std::span(bytes).first(now * sizeof(Stored)));
+    convertStored<Stored>(bytes.data(), now, swap, to + done);
+  }
+}
+
 /// A bounded pool of open input files, most recently used first. Thread-safe.
 class OpenFiles {
  public:
@@ -137,6 +152,9 @@ class PooledFile {
   std::filesystem::path path_;
   uint64_t size_ = 0;
 };
+
+/// The first `most` bytes of a file, or as many as it has. Throws Error if reading fails.
+std::string beginningOf(const InputFile& file, size_t most);
 
 /// Whether the path `named`, which is relative to `folder` unless it is absolute, lies outside of that folder.
 /// Symbolic links are the user's own and not looked at.

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <span>
 #include <string_view>
 #include <utility>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
@@ -29,10 +29,7 @@ using Hdf5Object = Hdf5Handle<H5Oclose>;
 
 std::set<std::string> rootLinksOf(const InputFile& file, std::initializer_list<const char*> names) {
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  std::string begin(kSignature.size(), '\0');
-  if (file.size() < begin.size()) return {};
-  file.readAt(0, std::span(begin.data(), begin.size()));
-  if (begin != kSignature) return {};
+  if (beginningOf(file, kSignature.size()) != kSignature) return {};
   requireWholeHdf5(file);
   tryHdf5(file.path());
   const QuietHdf5 quiet;

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "stream/base/disk_space.h"
 
 namespace curvisplat {
@@ -159,16 +160,10 @@ void unpackZstd(Input& input, const Sink& sink) {
   if (left != 0) input.fail("zstd", "it ends early");
 }
 
-std::string beginning(const InputFile& file) {
-  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kXz.size())), '\0');
-  file.readAt(0, std::span(begin.data(), begin.size()));
-  return begin;
-}
-
 }  // namespace
 
 bool UnpackedFile::recognises(const InputFile& file) {
-  const std::string begin = beginning(file);
+  const std::string begin = beginningOf(file, kXz.size());
   return begin.starts_with(kGzip) || begin.starts_with(kXz) || begin.starts_with(kZstd);
 }
 
@@ -178,7 +173,7 @@ UnpackedFile::UnpackedFile(const fs::path& path, const fs::path& folder)
   Input input(file);
   OutputFile out(path_);
   const Sink sink = [&](std::span<const std::byte> bytes) { out.append(bytes); };
-  const std::string begin = beginning(file);
+  const std::string begin = beginningOf(file, kXz.size());
   try {
     begin.starts_with(kGzip) ? unpackGzip(input, sink)
     : begin.starts_with(kXz) ? unpackXz(input, sink)

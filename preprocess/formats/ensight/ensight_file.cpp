@@ -21,16 +21,11 @@ std::string textOf(std::string_view line) {
 
 template <typename Value>
 void readList(const EnsightList& list, uint64_t first, std::span<Value> to) {
-  std::array<std::byte, 4 * 4096> bytes;
-  for (uint64_t done = 0; done < to.size(); done += 4096) {
-    const size_t count = std::min<size_t>(4096, to.size() - done);
-    const auto part = std::span(bytes).first(4 * count);
-    list.file->readAt(list.begin + 4 * (first + done), part);
-    if (list.integers)
-      convertStored<int32_t>(part.data(), count, list.swap, to.data() + done);
-    else
-      convertStored<float>(part.data(), count, list.swap, to.data() + done);
-  }
+  const uint64_t offset = list.begin + 4 * first;
+  if (list.integers)
+    readStored<int32_t>(*list.file, offset, to.size(), list.swap, to.data());
+  else
+    readStored<float>(*list.file, offset, to.size(), list.swap, to.data());
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/element_source.h"
 #include "preprocess/formats/common/scalar_list.h"
 #include "preprocess/formats/common/spool_file.h"
@@ -382,10 +383,8 @@ void GmshSource::readValues(uint32_t, uint32_t scalar, uint64_t first, std::span
 }  // namespace
 
 bool isGmsh(const InputFile& file) {
-  std::string begin(std::string_view("$MeshFormat").size(), '\0');
-  if (file.size() < begin.size()) return false;
-  file.readAt(0, std::span(begin.data(), begin.size()));
-  return begin == "$MeshFormat";
+  constexpr std::string_view kSignature = "$MeshFormat";
+  return beginningOf(file, kSignature.size()) == kSignature;
 }
 
 uint64_t gmshFiles(const std::filesystem::path& path) {

@@ -43,11 +43,8 @@ size_t NetcdfBox::values() const {
 }
 
 bool NetcdfFile::recognises(const InputFile& file) {
-  std::array<char, 8> begin{};
-  if (file.size() < begin.size()) return false;
-  file.readAt(0, std::span<char>(begin));
-  const std::string_view mark(begin.data(), begin.size());
-  return isClassic(mark) || mark == "\x89HDF\r\n\x1a\n";
+  const std::string mark = beginningOf(file, 8);
+  return mark.size() == 8 && (isClassic(mark) || mark == "\x89HDF\r\n\x1a\n");
 }
 
 NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path), watched_(path) {

@@ -136,13 +136,11 @@ std::vector<double> Plot3dFile::parameters(uint32_t block) const {
   const uint64_t begin = fit_.blocks[block].values_offset - ((before + behind) * width + integer);
   std::vector<double> values(before + behind);
   const auto read = [&](uint64_t offset, std::span<double> to) {
-    std::vector<std::byte> bytes(to.size() * width);
-    fit_.payload.readAt(offset, bytes);
     const bool swap = layout.byte_order != kMachineByteOrder;
     if (width == 8)
-      convertStored<double>(bytes.data(), to.size(), swap, to.data());
+      readStored<double>(fit_.payload, offset, to.size(), swap, to.data());
     else
-      convertStored<float>(bytes.data(), to.size(), swap, to.data());
+      readStored<float>(fit_.payload, offset, to.size(), swap, to.data());
   };
   read(begin, std::span(values).first(before));
   read(begin + before * width + integer, std::span(values).subspan(before));

@@ -185,8 +185,7 @@ constexpr uint64_t kLooked = 4096;
 /// The first two lines that are neither empty nor comments, without the white space around them; empty
 /// where the beginning has none.
 std::array<std::string, 2> firstLinesOf(const InputFile& file) {
-  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
-  file.readAt(0, std::span(begin.data(), begin.size()));
+  const std::string begin = beginningOf(file, kLooked);
   std::array<std::string, 2> lines;
   size_t found = 0;
   for (size_t at = 0; at < begin.size() && found < lines.size();) {

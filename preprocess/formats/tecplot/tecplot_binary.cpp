@@ -390,10 +390,7 @@ int versionOf(const PooledFile& file) {
 }  // namespace
 
 bool isTecplotBinary(const InputFile& file) {
-  if (file.size() < kMagicBytes) return false;
-  std::string magic(kMagic.size(), ' ');
-  file.readAt(0, std::span(magic.data(), magic.size()));
-  return magic == kMagic;
+  return file.size() >= kMagicBytes && beginningOf(file, kMagic.size()) == kMagic;
 }
 
 TecplotData readTecplotBinary(const std::shared_ptr<const PooledFile>& file) {

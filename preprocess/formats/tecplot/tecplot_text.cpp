@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/spool_file.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/tecplot/tecplot_header.h"
@@ -381,8 +382,7 @@ class Reader {
 }  // namespace
 
 bool isTecplotText(const InputFile& file) {
-  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
-  file.readAt(0, std::span(begin.data(), begin.size()));
+  const std::string begin = beginningOf(file, kLooked);
   if (begin.find('\0') != std::string::npos) return false;
   for (size_t at = 0; at < begin.size();) {
     const size_t end = std::min(begin.find('\n', at), begin.size());
