@@ -76,18 +76,18 @@ void serve(const ServeArguments& arguments) {
   returnFreedMemory(kLargeBlock);
   const ServerOptions options = optionsFrom(arguments);
   warnOfNetwork(options);
-  const ServedCaches caches(arguments.caches, faceNamesOf);
+  ServedFolders folders(arguments.caches, faceNamesOf);
+  const size_t served = folders.caches()->size();
   requireThreads();
   Progress progress;
   const StopOnSignals stopping(progress);
-  runServer(caches, options, progress, [&](const std::string& address) {
+  runServer(folders, options, progress, [&](const std::string& address) {
     fmt::print("{}\n", address);
     std::fflush(stdout);
     printMessage(
         "serving {} to at most {} at a time; anyone who has the address above can look at "
         "{}",
-        countText(caches.size(), "cache"), countText(options.viewers, "viewer"),
-        caches.size() == 1 ? "it" : "them");
+        countText(served, "cache"), countText(options.viewers, "viewer"), served == 1 ? "it" : "them");
   });
 }
 
