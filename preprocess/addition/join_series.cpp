@@ -64,8 +64,10 @@ uint64_t countParts(const fs::path& folder) {
     if (std::sscanf(name.c_str(), "%lluof%llu.jso%c", &index, &of, &rest) != 3 || rest != 'n') continue;
     if (of < 1 || of > kMaxParts || index > of) continue;
     if (count && *count != of)
-      throw Error("{}: has parts of {} and parts of {}; remove those of another conversion", folder.string(),
-                  std::min<uint64_t>(*count, of), std::max<uint64_t>(*count, of));
+      throw Error(
+          "{0}: has parts of {1} and parts of {2}, which are of two conversions; remove the files *of{1}.* "
+          "or *of{2}.*",
+          folder.string(), std::min<uint64_t>(*count, of), std::max<uint64_t>(*count, of));
     count = of;
   }
   if (!count)
@@ -124,7 +126,14 @@ class Joining {
   Joining(const JoinOptions& options, Progress& progress)
       : options_(options), progress_(progress), count_(countParts(options.folder)) {
     for (uint64_t index = 0; index < count_; ++index) {
-      records_.push_back(readRecord(options.folder, {index, count_}));
+      const SeriesPart part{index, count_};
+      // A part without steps need not have been converted.
+      if (index > 0 && placesOfPart(part, records_[0].steps).empty() &&
+          !fs::exists(recordPath(options.folder, part))) {
+        records_.push_back({records_[0].steps, {}});
+        continue;
+      }
+      records_.push_back(readRecord(options.folder, part));
       if (records_[index].steps != records_[0].steps)
         throw Error("{}: part {} is of a series of {} steps, part 1 of one of {}; convert both again",
                     options.folder.string(), index + 1, records_[index].steps, records_[0].steps);
