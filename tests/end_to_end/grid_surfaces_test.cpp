@@ -381,6 +381,15 @@ TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
       {{"--surface-by", "f"}, "wake.splats", 2, "--surface-by f needs faces of the grid"}};
   for (const auto& [options, cache, status, words] : refused)
     expectRefused(render(options, cache), status, {words});
+  // A colour that the scalar's colours cover. A surface's file has it.
+  write(file("plate.stl"),
+        "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+        "0\nendloop\nendfacet\nendsolid s\n");
+  const Words covered{"--surface", "kmin", "--surface-by", "f", "--surface-colour", "#ff0000"};
+  expectSays(run(render(covered)).err,
+             "warning: --surface-colour #ff0000: has no effect, since --surface-by f");
+  EXPECT_EQ(run(render(covered + Words{"--surface", file("plate.stl")})).err.find("--surface-colour"),
+            std::string::npos);
   // No conversion keeps a plane that the grid does not have.
   for (const char* face : {"block 9:k=0", "k=48"}) {
     const ProgramResult result = runProgram(render({"--surface", face}));
