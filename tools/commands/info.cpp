@@ -194,12 +194,18 @@ Probe probed(const CacheReader& reader, const std::vector<StepPosition>& positio
     inputs.insert(inputs.end(), {options.grid.grid, source.grid});
     checkOutputFile("-o", options.probe.plot, inputs);
   }
+  bool doubted = false;
   for (const StepPosition& position : positions) {
     ProbedStep of_step{position.step, 0, {}};
     if (position.step < reader.series().steps.size()) {
       const CacheReader at = reader.at(position);
       of_step.time = reader.series().steps[position.step].time;
-      of_step.found = valuesAt(at, probe.asked.points, probe.of_source ? &probe.source : nullptr);
+      std::string doubt;
+      of_step.found = valuesAt(at, probe.asked.points, probe.of_source ? &probe.source : nullptr, &doubt);
+      if (!doubt.empty() && !doubted)
+        printMessage("warning: {}{}", positions.size() > 1 ? fmt::format("step {}: ", position.step) : "",
+                     doubt);
+      doubted |= !doubt.empty();
     } else {
       of_step.found.resize(probe.asked.points.size());
     }
