@@ -363,6 +363,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
 }
 
 void printCacheInfo(const InfoOptions& options) {
+  if (options.probe.of_source && !options.probe.any())
+    throw UsageError("--source: is read at points; add --probe X,Y,Z or --probe-line");
   if (!options.grid.solutions.empty())
     throw UsageError("{}: is a splat cache, but solution files were given as well; give only the cache",
                      options.grid.grid.string());
@@ -398,8 +400,8 @@ void printCacheInfo(const InfoOptions& options) {
   size_t findings = 0;
   for (const Findings& of_reader : found) findings += of_reader.verification.findings.size();
   if (findings > 0)
-    throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
-                findings);
+    throw Error("{}: the cache is damaged ({}); convert the grid again", options.grid.grid.string(),
+                countText(findings, "finding"));
   if (options.probe.any() && joined.isOutside()) {
     glm::dvec3 lower = readers[0].manifest().lower, upper = readers[0].manifest().upper;
     for (const CacheReader& reader : readers) {

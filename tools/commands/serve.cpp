@@ -97,7 +97,9 @@ void addServe(CLI::App& app) {
   auto arguments = std::make_shared<ServeArguments>();
   CLI::App* command = app.add_subcommand("serve", "Show caches in a web browser");
   command->add_option("CACHE", arguments->caches, "Splat caches, directories NAME.splats")->required();
-  command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")->capture_default_str();
+  command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
   command
       ->add_option("--listen", arguments->listen,
                    "Address to listen on; any but the loopback's lets other machines connect, unencrypted")
