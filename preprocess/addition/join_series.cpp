@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMaxParts = 1'000'000, kLargestRecord = uint64_t{1} << 30;
+constexpr uint64_t kMaxParts = 1'000'000, kMaxSteps = 10'000'000, kLargestRecord = uint64_t{1} << 30;
 
 std::string nameOf(const SeriesPart& part) {
   return fmt::format("{}of{}", part.index + 1, part.count);
@@ -47,7 +47,7 @@ PartRecord readRecord(const fs::path& folder, const SeriesPart& part) {
   const JsonDocument document(readTextFile(path, kLargestRecord), path.string(), "the record of a part",
                               "convert the part again");
   PartRecord record;
-  record.steps = document.root().at("steps_of_series").count();
+  record.steps = document.root().at("steps_of_series").count(0, kMaxSteps);
   for (const JsonField& step : document.root().at("steps").elements())
     record.origins.push_back({step.at("states_time").flag(), step.at("sources").texts()});
   return record;
@@ -128,8 +128,8 @@ class Joining {
     for (uint64_t index = 0; index < count_; ++index) {
       const SeriesPart part{index, count_};
       // A part without steps need not have been converted.
-      if (index > 0 && placesOfPart(part, records_[0].steps).empty() &&
-          !fs::exists(recordPath(options.folder, part))) {
+      if (index > 0 && !fs::exists(recordPath(options.folder, part)) &&
+          placesOfPart(part, records_[0].steps).empty()) {
         records_.push_back({records_[0].steps, {}});
         continue;
       }
