@@ -381,15 +381,6 @@ TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
       {{"--surface-by", "f"}, "wake.splats", 2, "--surface-by f needs faces of the grid"}};
   for (const auto& [options, cache, status, words] : refused)
     expectRefused(render(options, cache), status, {words});
-  // A colour that the scalar's colours cover. A surface's file has it.
-  write(file("plate.stl"),
-        "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
-        "0\nendloop\nendfacet\nendsolid s\n");
-  const Words covered{"--surface", "kmin", "--surface-by", "f", "--surface-colour", "#ff0000"};
-  expectSays(run(render(covered)).err,
-             "warning: --surface-colour #ff0000: has no effect, since --surface-by f");
-  EXPECT_EQ(run(render(covered + Words{"--surface", file("plate.stl")})).err.find("--surface-colour"),
-            std::string::npos);
   // No conversion keeps a plane that the grid does not have.
   for (const char* face : {"block 9:k=0", "k=48"}) {
     const ProgramResult result = runProgram(render({"--surface", face}));
@@ -399,6 +390,17 @@ TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
       {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("no.splats"), "--surface", "k=200"});
   EXPECT_EQ(plane.status, 1);
   expectSays(plane.err, "no block has k=200; expected 0 to 47");
+}
+
+TEST_F(GridSurfaceOptions, AColourThatTheScalarsColoursCoverIsNamed) {
+  const Words covered{"--surface", "kmin", "--surface-by", "f", "--surface-colour", "#ff0000"};
+  expectSays(run(render(covered)).err,
+             "warning: --surface-colour #ff0000: has no effect, since --surface-by f colours the faces");
+  // A surface's file has it.
+  std::ofstream(file("plate.stl")) << "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                                      "vertex 0 1 0\nendloop\nendfacet\nendsolid s\n";
+  EXPECT_EQ(run(render(covered + Words{"--surface", file("plate.stl")})).err.find("--surface-colour"),
+            std::string::npos);
 }
 
 }  // namespace
