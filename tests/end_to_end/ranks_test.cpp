@@ -257,7 +257,7 @@ TEST_F(RanksCommand, ConvertASeriesTogether) {
   run(to("s3.splats", {"--part", "3/4"}));
   run(join);
   EXPECT_TRUE(filesOf(file("s3.splats")) == expected);
-  // The part without steps may be missing. Of two conversions none is chosen.
+  // The part without steps may be missing. Parts of two conversions are refused.
   fs::remove(file("s3.splats.parts/4of4.json"));
   run(join + Words{"--overwrite"});
   EXPECT_TRUE(filesOf(file("s3.splats")) == expected);

@@ -29,7 +29,7 @@ struct ServedCache {
   std::vector<std::string> faces;
 };
 
-/// What a viewer is shown. Every function with a cache's number throws UsageError if there is no such cache.
+/// The caches that a viewer is shown. Every function with a cache's number throws UsageError if there is no such cache.
 class ServedCaches {
  public:
   using All = std::vector<std::shared_ptr<const ServedCache>>;
