@@ -371,7 +371,7 @@ def changing_cache():
 
     cache, manifest = f"{folder}/wake.splats", pathlib.Path(folder, "wake.splats", "manifest.json")
     run("generate", "wake", "--size", "24x16x12", "--steps", "2", "-o", f"{folder}/w")
-    run("convert", f"{folder}/w.xyz", f"{folder}/w_0000.fun", "-o", cache)
+    run("convert", f"{folder}/w.xyz", f"{folder}/w_0000.fun", "-o", cache, "--refine", "1")
     with serving(program, [cache]) as server:
         before = Viewer(server)
         name = before.open()["scalars"][0]["name"]
@@ -389,7 +389,7 @@ def changing_cache():
         expect(facts()[1] == 2 and "as it was before" in server.messages(), f"a damaged cache stays as it was: {server.messages()}")
         manifest.write_bytes(whole)
         run("generate", "wake", "--size", "20x16x12", "-o", f"{folder}/other")
-        run("convert", f"{folder}/other.xyz", f"{folder}/other.fun", "-o", cache, "--overwrite")
+        run("convert", f"{folder}/other.xyz", f"{folder}/other.fun", "-o", cache, "--overwrite", "--refine", "1")
         expect(facts() == ([name], 1, 20 * 16 * 12), f"the cache in its place is shown: {facts()}")
         draws_on("the end of its cache")
 
