@@ -137,44 +137,13 @@ UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   return manifest.stretch == kDualCells ? UnlikeHalves::kApart : UnlikeHalves::kApartInCells;
 }
 
-namespace {
-
-/// Whether the boxes have no more rows than some lists over all blocks would have: each takes memory.
-bool haveRowsOf(std::span<const WallSide> boxes, std::span<const GridBlock> blocks) {
-  constexpr uint64_t kMaxLists = 16;
-  uint64_t most = 0, rows = 0;
-  for (const GridBlock& block : blocks) most += kMaxLists * block.nj * block.nk;
-  for (const WallSide& box : boxes) {
-    if (box.block >= blocks.size()) return false;
-    const auto along = [&](size_t axis, uint64_t count) {
-      const uint64_t end = std::min(box.last[axis], count - 1) + 1;
-      return end - std::min(box.first[axis], end);
-    };
-    rows += along(1, blocks[box.block].nj) * along(2, blocks[box.block].nk);
-    if (rows > most) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
 ThinWalls thinWallsOf(const CacheReader& cache) {
   const Manifest& manifest = cache.manifest();
   if (!manifest.hasFeature(kThinWalls)) return {};
-  const InputFile file(cacheFile(cache.path(), kThinWallsFileName));
-  const auto info = std::ranges::find(manifest.files, kThinWallsFileName, &FileInfo::name);
-  constexpr uint64_t kLargest = uint64_t{64} << 20;
-  std::vector<WallSide> boxes(std::min(file.size(), kLargest) / sizeof(WallSide));
-  file.readAt(0, std::span(boxes));
-  const auto bytes = std::as_bytes(std::span(boxes));
-  if (info == manifest.files.end() || file.size() != bytes.size() || checksumOf(bytes) != info->checksum)
-    throw Error("{}: is damaged (found {} bytes with another checksum than the manifest's); convert again",
-                file.path().string(), file.size());
+  const auto bytes = readListed(cache.path(), kThinWallsFileName, manifest, kMaxThinWallsBytes);
   std::vector<GridBlock> blocks;
   for (const BlockInfo& block : manifest.blocks) blocks.push_back({block.name, block.ni, block.nj, block.nk});
-  if (!haveRowsOf(boxes, blocks))
-    throw Error("{}: is damaged (has boxes that are not of the grid); convert again", file.path().string());
-  return ThinWalls(boxes, blocks);
+  return ThinWalls::read(bytes, blocks, (cache.path() / kThinWallsFileName).string());
 }
 
 CacheGrid::CacheGrid(const GridSource& source) : ForwardingGrid(source) {

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMaxParts = 1'000'000, kLargestRecord = uint64_t{1} << 30;
+constexpr uint64_t kMaxParts = 1'000'000, kMaxSteps = 10'000'000, kLargestRecord = uint64_t{1} << 30;
 
 std::string nameOf(const SeriesPart& part) {
   return fmt::format("{}of{}", part.index + 1, part.count);
@@ -47,7 +47,7 @@ PartRecord readRecord(const fs::path& folder, const SeriesPart& part) {
   const JsonDocument document(readTextFile(path, kLargestRecord), path.string(), "the record of a part",
                               "convert the part again");
   PartRecord record;
-  record.steps = document.root().at("steps_of_series").count();
+  record.steps = document.root().at("steps_of_series").count(0, kMaxSteps);
   for (const JsonField& step : document.root().at("steps").elements())
     record.origins.push_back({step.at("states_time").flag(), step.at("sources").texts()});
   return record;
@@ -64,8 +64,10 @@ uint64_t countParts(const fs::path& folder) {
     if (std::sscanf(name.c_str(), "%lluof%llu.jso%c", &index, &of, &rest) != 3 || rest != 'n') continue;
     if (of < 1 || of > kMaxParts || index > of) continue;
     if (count && *count != of)
-      throw Error("{}: has parts of {} and parts of {}; remove those of another conversion", folder.string(),
-                  std::min<uint64_t>(*count, of), std::max<uint64_t>(*count, of));
+      throw Error(
+          "{0}: has parts of {1} and parts of {2}, which are of two conversions; remove the files *of{1}.* "
+          "or *of{2}.*",
+          folder.string(), std::min<uint64_t>(*count, of), std::max<uint64_t>(*count, of));
     count = of;
   }
   if (!count)
@@ -124,7 +126,14 @@ class Joining {
   Joining(const JoinOptions& options, Progress& progress)
       : options_(options), progress_(progress), count_(countParts(options.folder)) {
     for (uint64_t index = 0; index < count_; ++index) {
-      records_.push_back(readRecord(options.folder, {index, count_}));
+      const SeriesPart part{index, count_};
+      // A part without steps need not have been converted.
+      if (index > 0 && !fs::exists(recordPath(options.folder, part)) &&
+          placesOfPart(part, records_[0].steps).empty()) {
+        records_.push_back({records_[0].steps, {}});
+        continue;
+      }
+      records_.push_back(readRecord(options.folder, part));
       if (records_[index].steps != records_[0].steps)
         throw Error("{}: part {} is of a series of {} steps, part 1 of one of {}; convert both again",
                     options.folder.string(), index + 1, records_[index].steps, records_[0].steps);

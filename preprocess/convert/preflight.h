@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include "preprocess/convert/convert_options.h"
@@ -36,7 +37,9 @@ struct ConversionEstimate {
   double seconds = 0;
 };
 enum class SplatsOf { kGrid, kMeshPoints, kMeshCells };
-ConversionEstimate estimateConversion(uint64_t splats, unsigned threads, SplatsOf what);
+/// `blocks`: of a structured grid; many small ones take longer.
+ConversionEstimate estimateConversion(uint64_t splats, unsigned threads, SplatsOf what,
+                                      std::span<const GridBlock> blocks = {});
 
 /// Throws Error if something stands at `output` that may not be replaced, or if its folder or
 /// `temporary_folder` is missing or not writable. Changes nothing.

@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "stream/base/error.h"
+
 namespace curvisplat {
 namespace {
 
@@ -42,7 +44,34 @@ void joinPairs(std::vector<WallSide>& boxes) {
   boxes = std::move(joined);
 }
 
+/// Whether the boxes have no more rows than some lists over all blocks would have: each takes memory.
+bool haveRowsOf(std::span<const WallSide> boxes, std::span<const GridBlock> blocks) {
+  constexpr uint64_t kMaxLists = 16;
+  uint64_t most = 0, rows = 0;
+  for (const GridBlock& block : blocks) most += kMaxLists * block.nj * block.nk;
+  for (const WallSide& box : boxes) {
+    if (box.block >= blocks.size()) return false;
+    const auto along = [&](size_t axis, uint64_t count) {
+      const uint64_t end = std::min(box.last[axis], count - 1) + 1;
+      return end - std::min(box.first[axis], end);
+    };
+    rows += along(1, blocks[box.block].nj) * along(2, blocks[box.block].nk);
+    if (rows > most) return false;
+  }
+  return true;
+}
+
 }  // namespace
+
+ThinWalls ThinWalls::read(std::span<const std::byte> bytes, std::span<const GridBlock> blocks,
+                          const std::string& name) {
+  std::vector<WallSide> boxes(bytes.size() / sizeof(WallSide));
+  const auto to = std::as_writable_bytes(std::span(boxes));
+  std::copy_n(bytes.begin(), to.size(), to.begin());
+  if (bytes.size() % sizeof(WallSide) != 0 || !haveRowsOf(boxes, blocks))
+    throw Error("{}: is damaged (has boxes that are not of the grid); convert again", name);
+  return {boxes, blocks};
+}
 
 ThinWalls::ThinWalls(std::span<const WallSide> boxes, std::span<const GridBlock> blocks) {
   std::vector<uint64_t> first_node{0};
@@ -50,7 +79,7 @@ ThinWalls::ThinWalls(std::span<const WallSide> boxes, std::span<const GridBlock>
   for (const WallSide& box : boxes) {
     if (box.block >= blocks.size()) continue;
     const GridBlock& block = blocks[box.block];
-    const uint64_t end = std::min(box.last[0] + 1, block.ni);
+    const uint64_t end = std::min(box.last[0], block.ni - 1) + 1;
     for (uint64_t k = box.first[2]; k <= box.last[2] && k < block.nk; ++k)
       for (uint64_t j = box.first[1]; j <= box.last[1] && j < block.nj; ++j) {
         const uint64_t row = first_node[box.block] + (k * block.nj + j) * block.ni;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -18,6 +19,9 @@ class ThinWalls {
   ThinWalls() = default;
   /// Boxes that are not in the grid are cut to it.
   ThinWalls(std::span<const WallSide> boxes, std::span<const GridBlock> blocks);
+  /// Reads the bytes of a cache's list. Throws Error, with `name`, if they are no boxes, or more than a list of this grid has.
+  static ThinWalls read(std::span<const std::byte> bytes, std::span<const GridBlock> blocks,
+                        const std::string& name);
 
   uint32_t sideOf(uint64_t node) const;
 

@@ -62,8 +62,8 @@ glm::dvec3 directionOf(const Camera& camera) {
   const glm::dvec3 towards = camera.focal_point - camera.position;
   const double distance = glm::length(towards);
   if (!(distance > 0))
-    throw UsageError("the camera's position and focal point coincide at ({}, {}, {})", camera.position.x,
-                     camera.position.y, camera.position.z);
+    throw UsageError("the camera's position and its focal point are one place, {},{},{}; move one of them",
+                     camera.position.x, camera.position.y, camera.position.z);
   return towards / distance;
 }
 

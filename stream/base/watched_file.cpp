@@ -2,15 +2,15 @@
 
 #include <sys/stat.h>
 
+#include <map>
 #include <utility>
 
 #include "stream/base/error.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
-WatchedFile::WatchedFile(std::filesystem::path path) : path_(std::move(path)), opened_(stateOf(path_)) {}
-
-WatchedFile::State WatchedFile::stateOf(const std::filesystem::path& path) {
+FileState FileState::of(const std::filesystem::path& path) {
   struct stat found {};
   if (::stat(path.c_str(), &found) != 0 || !S_ISREG(found.st_mode)) return {};
   constexpr int64_t kNanoseconds = 1'000'000'000;
@@ -18,23 +18,26 @@ WatchedFile::State WatchedFile::stateOf(const std::filesystem::path& path) {
           kNanoseconds * found.st_mtim.tv_sec + found.st_mtim.tv_nsec};
 }
 
+WatchedFile::WatchedFile(std::filesystem::path path)
+    : path_(std::move(path)), opened_(FileState::of(path_)) {}
+
 bool WatchedFile::isSame() const {
-  const State now = stateOf(path_);
+  const FileState now = FileState::of(path_);
   return now.bytes == opened_.bytes && now.changed_ns == opened_.changed_ns;
 }
 
 bool WatchedFile::isWhole() const {
-  const State now = stateOf(path_);
-  if (now == opened_ || now == State{}) return true;
+  const FileState now = FileState::of(path_);
+  if (now == opened_ || now == FileState{}) return true;
   return isOpened(now) && now.bytes > opened_.bytes;
 }
 
-bool WatchedFile::isOpened(const State& now) const {
+bool WatchedFile::isOpened(const FileState& now) const {
   return now.device == opened_.device && now.number == opened_.number;
 }
 
 void WatchedFile::requireWhole() const {
-  const State now = stateOf(path_);
+  const FileState now = FileState::of(path_);
   if (isOpened(now) && now.bytes < opened_.bytes) failAsChanged();
 }
 
@@ -42,7 +45,54 @@ void WatchedFile::failAsChanged() const {
   throw Error("{}: was changed while it was read; start again when it is complete", path_.string());
 }
 
-WatchedFiles::WatchedFiles(const std::vector<std::string>& names) : files_(names.begin(), names.end()) {}
+namespace {
+
+class Links {
+ public:
+  void add(const std::filesystem::path& from, std::set<std::filesystem::path> to) {
+    const MutexLock lock(mutex_);
+    if (!to.empty()) links_[from].merge(to);
+  }
+  std::set<std::filesystem::path> of(const std::filesystem::path& file) const {
+    const MutexLock lock(mutex_);
+    const auto found = links_.find(file);
+    return found == links_.end() ? std::set<std::filesystem::path>() : found->second;
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::map<std::filesystem::path, std::set<std::filesystem::path>> links_ GUARDED_BY(mutex_);
+};
+
+Links& links() {
+  static Links all;
+  return all;
+}
+
+}  // namespace
+
+void noteLinks(const std::filesystem::path& from, const std::set<std::filesystem::path>& to) {
+  links().add(from, to);
+}
+
+WatchedFiles::WatchedFiles(const std::vector<std::string>& names) {
+  std::vector<std::filesystem::path> files(names.begin(), names.end());
+  std::set<std::filesystem::path> known(files.begin(), files.end());
+  for (size_t n = 0; n < files.size(); ++n) {
+    files_.emplace_back(files[n]);
+    for (const std::filesystem::path& next : links().of(files[n]))
+      if (known.insert(next).second) files.push_back(next);
+  }
+}
+
+void WatchedFiles::requireSame() const {
+  for (const WatchedFile& file : files_)
+    if (!file.isSame()) file.failAsChanged();
+}
+
+void WatchedFiles::requireWhole() const {
+  for (const WatchedFile& file : files_) file.requireWhole();
+}
 
 void WatchedFiles::warn(std::vector<std::string>& warnings) const {
   for (const WatchedFile& file : files_)

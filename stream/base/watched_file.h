@@ -4,15 +4,27 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
 namespace curvisplat {
 
+/// Tells whether a file is unchanged, without reading it.
+struct FileState {
+  uint64_t device = 0, number = 0, bytes = 0;
+  int64_t changed_ns = 0;
+
+  bool operator==(const FileState& other) const = default;
+
+  /// Returns zeros for a name without a file, and for a folder, which gets files of further steps.
+  static FileState of(const std::filesystem::path& path);
+};
+
 /// Keeps what a file was when it was opened. Any thread may ask.
 class WatchedFile {
  public:
-  /// Notes the file as it is now. One that is not there never changes, nor does a folder, which gets files of further steps.
+  /// Notes the file as it is now. One that is not there never changes, nor does a folder.
   explicit WatchedFile(std::filesystem::path path);
 
   /// Whether the name has a file of the same length and the same time of change.
@@ -28,23 +40,23 @@ class WatchedFile {
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  struct State {
-    uint64_t device = 0, number = 0, bytes = 0;
-    int64_t changed_ns = 0;
-
-    bool operator==(const State& other) const = default;
-  };
-  static State stateOf(const std::filesystem::path& path);
-  bool isOpened(const State& now) const;
+  bool isOpened(const FileState& now) const;
 
   std::filesystem::path path_;
-  State opened_;
+  FileState opened_;
 };
 
-/// The files of a grid that becomes a cache.
+/// Notes that a file leads to others, for WatchedFiles that are made later. Any thread.
+void noteLinks(const std::filesystem::path& from, const std::set<std::filesystem::path>& to);
+
+/// Some files, with those that they lead to at any depth (noteLinks()).
 class WatchedFiles {
  public:
-  explicit WatchedFiles(const std::vector<std::string>& names);
+  explicit WatchedFiles(const std::vector<std::string>& names = {});
+
+  /// Throw Error as WatchedFile::failAsChanged() does for a file that is not the same, or has become shorter.
+  void requireSame() const;
+  void requireWhole() const;
   /// Adds a warning for each file that is not whole.
   void warn(std::vector<std::string>& warnings) const;
 

@@ -299,6 +299,22 @@ const FileInfo& checkFile(const InputFile& file, const Manifest& manifest) {
   return checkFile(file.path(), file.size(), manifest);
 }
 
+std::vector<std::byte> readListed(const fs::path& cache, const std::string& name, const Manifest& manifest,
+                                  uint64_t most) {
+  const InputFile file(cacheFile(cache, name));
+  const FileInfo& info = checkFile(file, manifest);
+  if (file.size() > most)
+    throw Error("{}: is too large (found {} bytes, expected {} at most); the cache is damaged: convert again",
+                file.path().string(), file.size(), most);
+  std::vector<std::byte> bytes(file.size());
+  file.readAt(0, std::span(bytes));
+  if (const uint64_t found = checksumOf(bytes); found != info.checksum)
+    throw Error(
+        "{}: has a wrong checksum (found {:016x}, expected {:016x}); the file is damaged: convert again",
+        file.path().string(), found, info.checksum);
+  return bytes;
+}
+
 std::vector<Brick> readBricks(const fs::path& cache, const Manifest& manifest) {
   const InputFile file(cacheFile(cache, "bricks.bin"));
   const FileInfo& info = checkFile(file, manifest);

@@ -6,6 +6,7 @@
 // a time, so that a sparse file cannot claim memory. Any thread may call the functions.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -40,6 +41,9 @@ std::vector<BrickVariable> readVariableTable(const InputFile& file, const FileIn
 /// Throws Error unless the manifest lists the file with its actual size. Returns the manifest's entry.
 const FileInfo& checkFile(const InputFile& file, const Manifest& manifest);
 const FileInfo& checkFile(const std::filesystem::path& path, uint64_t bytes, const Manifest& manifest);
+/// Reads a file that the manifest lists as a whole. Throws Error if it has another size or checksum, or more than `most` bytes.
+std::vector<std::byte> readListed(const std::filesystem::path& cache, const std::string& name,
+                                  const Manifest& manifest, uint64_t most);
 /// Throws Error unless the file has the size that `info` states.
 void checkSize(const std::filesystem::path& path, uint64_t bytes, const FileInfo& info);
 

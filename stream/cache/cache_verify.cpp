@@ -272,24 +272,11 @@ class Verifier {
   }
 
   void verifyThinWalls() {
-    for (const FileInfo& info : reader_.manifest().files) {
-      if (info.name != kThinWallsFileName) continue;
-      const std::filesystem::path path = reader_.path() / info.name;
-      try {
-        const InputFile file(cacheFile(reader_.path(), info.name));
-        Checksum checksum;
-        std::vector<std::byte> bytes(sizeof(WallSide) * 1024);
-        for (uint64_t at = 0; at < file.size(); at += bytes.size()) {
-          bytes.resize(std::min<uint64_t>(bytes.size(), file.size() - at));
-          file.readAt(at, std::span(bytes));
-          checksum.add(bytes);
-        }
-        if (checksum.value() != info.checksum)
-          find("{}: has a wrong checksum (found {:016x}, expected {:016x})", path.string(), checksum.value(),
-               info.checksum);
-      } catch (const Error& error) {
-        find("{}", error.what());
-      }
+    if (!reader_.manifest().hasFeature(kThinWalls)) return;
+    try {
+      readListed(reader_.path(), kThinWallsFileName, reader_.manifest(), kMaxThinWallsBytes);
+    } catch (const Error& error) {
+      find("{}", error.what());
     }
   }
 

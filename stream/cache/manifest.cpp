@@ -322,7 +322,7 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
         "again",
         path.string(), text.size(), kLargestText);
   JsonDocument document(text, path.string(), "the manifest of a cache",
-                        "the file is damaged or was written by another program");
+                        "the file is damaged or was written by another program: convert again");
   {
     const JsonField format = document.root().at("format");
     if (format.text() != kFormat) format.fail(fmt::format("\"{}\"", kFormat));

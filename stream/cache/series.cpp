@@ -283,7 +283,8 @@ Manifest readManifest(const fs::path& cache) {
     throw Error(
         "{}: does not exist{}; expected a splat cache (convert the grid first: curvisplat convert GRID -o "
         "{})",
-        cache.string(), didYouMean(cache.string(), cachesBeside(cache)), cache.string());
+        cache.string(), didYouMean(cache.string(), cachesBeside(cache)),
+        cache.extension() == ".splats" ? cache.string() : "NAME.splats");
   }
   if (!fs::is_directory(cache))
     throw Error(
@@ -291,8 +292,11 @@ Manifest readManifest(const fs::path& cache) {
         "NAME.splats)",
         cache.string());
   if (!fs::exists(cache / "manifest.json"))
-    throw Error("{}: contains no manifest.json; it is not a splat cache, or its conversion is unfinished",
-                cache.string());
+    throw Error(
+        "{}: contains no manifest.json; expected a splat cache (convert the grid first: curvisplat convert "
+        "GRID "
+        "-o NAME.splats; repeat an interrupted conversion with --resume)",
+        cache.string());
   const fs::path path = cacheFile(cache, "manifest.json");
   return Manifest::fromJson(readTextFile(path), path);
 }

@@ -15,6 +15,7 @@ namespace curvisplat {
 
 inline constexpr const char* kThinWalls = "thin-walls";  // Manifest::requirements
 inline constexpr const char* kThinWallsFileName = "walls.bin";
+inline constexpr uint64_t kMaxThinWallsBytes = 64 << 20;
 
 /// A box of nodes of one block that lie on one side of a thin wall. Nodes at one position are merged only if their sides
 /// are equal; those in no box have side 0.

@@ -210,6 +210,40 @@ TEST_F(BadInput, InvalidOptionValues) {
                 {"--memory 1 KiB: too little"});
 }
 
+TEST_F(BadInput, MessagesSayWhatToDo) {
+  const std::string cache = file("whole.splats"), picture = file("a.png"), grid = file("scene.xyz");
+  for (const char* name : {"hello.vts", "hello.nc", "hello.case"})
+    writeFileAtomically(file(name), std::string("hello\n"));
+  std::filesystem::create_directory(file("case"));
+  writeFileAtomically(file("case/a.foam"), std::string());
+  const std::pair<Words, const char*> wrong_usage[] = {
+      {{"serve", cache, "--port", "99999"}, "--port '99999': expected a number from 0 to 65535"},
+      {{"info", cache, "--source"}, "--source: is read at points; add --probe X,Y,Z or --probe-line"},
+      {{"info", cache, "--probe", "no.csv"},
+       "--probe no.csv: there is no such file; expected a point x,y,z, or a file"},
+      {{"render", cache, "-o", picture, "--position", "1,0,0", "--focal-point", "1,0,0"},
+       "position and its focal point are one place, 1,0,0; move one of them"},
+      {{"convert", grid, "--steps", "5", "-o", file("b.splats")},
+       "step 5 is out of range; there is one, step 0"}};
+  for (const auto& [words, text] : wrong_usage) expectRefused(words, 2, {text});
+  const std::pair<Words, const char*> wrong_files[] = {
+      {{"render", file("no.vtk"), "-o", picture},
+       "convert the grid first: curvisplat convert GRID -o NAME.splats"},
+      {{"render", file("case"), "-o", picture}, "contains no manifest.json; expected a splat cache (convert"},
+      {{"render", cache, "-o", cache + "/a.png"}, "which is read; choose another folder"},
+      {{"convert", file("hello.vts"), "-o", file("b.splats")},
+       "hello.vts: does not begin as a VTK XML file does"},
+      {{"convert", file("hello.nc"), "-o", file("b.splats")},
+       "hello.nc: does not begin as a NetCDF file does"},
+      {{"convert", file("hello.case"), "-o", file("b.splats")},
+       "hello.case: does not begin as an EnSight case does"},
+      {{"convert", file("case/a.foam"), "-o", file("b.splats")},
+       "its folder has none (expected constant/polyMesh there)"},
+      {{"convert", grid, file("scene.fun"), "-o", file("b.splats"), "--tmp", file("none")},
+       "none: does not exist; name another folder with --tmp"}};
+  for (const auto& [words, text] : wrong_files) expectRefused(words, 1, {text});
+}
+
 TEST_F(BadInput, MisspeltSubcommandGetsTheListOfThem) {
   expectRefused({"rendr", file("whole.splats")}, 2, {"rendr", "did you mean render?", "convert", "info"});
   expectRefused({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "9x9"}, 2,

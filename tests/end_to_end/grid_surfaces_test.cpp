@@ -392,5 +392,16 @@ TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
   expectSays(plane.err, "no block has k=200; expected 0 to 47");
 }
 
+TEST_F(GridSurfaceOptions, AColourThatTheScalarsColoursCoverIsNamed) {
+  const Words covered{"--surface", "kmin", "--surface-by", "f", "--surface-colour", "#ff0000"};
+  expectSays(run(render(covered)).err,
+             "warning: --surface-colour #ff0000: has no effect, since --surface-by f colours the faces");
+  // A surface's file has it.
+  std::ofstream(file("plate.stl")) << "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                                      "vertex 0 1 0\nendloop\nendfacet\nendsolid s\n";
+  EXPECT_EQ(run(render(covered + Words{"--surface", file("plate.stl")})).err.find("--surface-colour"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace curvisplat

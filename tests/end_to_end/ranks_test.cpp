@@ -257,6 +257,13 @@ TEST_F(RanksCommand, ConvertASeriesTogether) {
   run(to("s3.splats", {"--part", "3/4"}));
   run(join);
   EXPECT_TRUE(filesOf(file("s3.splats")) == expected);
+  // The part without steps may be missing. Parts of two conversions are refused.
+  fs::remove(file("s3.splats.parts/4of4.json"));
+  run(join + Words{"--overwrite"});
+  EXPECT_TRUE(filesOf(file("s3.splats")) == expected);
+  run(to("s3.splats", {"--part", "5/5"}));
+  expectRefused(join + Words{"--overwrite"}, 1,
+                {"has parts of 4 and parts of 5", "remove the files *of4.* or *of5.*"});
   for (const Words& wrong :
        {to("w.splats", {"--part", "5/4"}),
         to("w.splats", {"--part", "1/2", "--keep-going"}),

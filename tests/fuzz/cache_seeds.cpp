@@ -17,6 +17,7 @@
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/values_codec.h"
 #include "stream/model/border_code.h"
+#include "stream/model/thin_walls.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
 namespace curvisplat {
@@ -232,6 +233,21 @@ void writeJournals(const Seeds& seeds) {
   write("scattered");
 }
 
+void writeThinWalls(const Seeds& seeds) {
+  const auto write = [&](const char* name, const std::vector<std::array<uint8_t, 3>>& blocks,
+                         const std::vector<WallSide>& boxes) {
+    Seed seed;
+    seed.add(static_cast<uint8_t>(blocks.size() - 1));
+    for (const auto& dims : blocks)
+      for (const uint8_t n : dims) seed.add(static_cast<uint8_t>(n - 2));
+    seeds.write("thin_walls", name, seed.bytes(std::as_bytes(std::span(boxes))).whole());
+  };
+  write("plate", {{7, 5, 4}}, {{0, 1, {2, 0, 0}, {5, 0, 3}}});
+  write("overlapping", {{7, 5, 4}, {3, 3, 3}},
+        {{0, 1, {0, 0, 0}, {4, 1, 1}}, {0, 2, {2, 1, 1}, {6, 2, 3}}, {1, 3, {0, 0, 0}, {0, 2, 2}}});
+  write("beyond", {{4, 4, 4}}, {{0, 1, {2, 2, 2}, {UINT64_MAX, UINT64_MAX, UINT64_MAX}}});
+}
+
 void writeSplats(const Seeds& seeds) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> unit(0, 1);
@@ -263,6 +279,7 @@ void writeCacheSeeds(const Seeds& seeds) {
   writeFaces(seeds);
   writeBrickLog(seeds);
   writeJournals(seeds);
+  writeThinWalls(seeds);
   writeSplats(seeds);
 }
 

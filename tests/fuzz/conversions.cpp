@@ -1,10 +1,14 @@
-// Files that conversions leave on disk: journals, and records of the parts of a series.
+// Files that conversions leave on disk: journals, records of the parts of a series, and lists of thin walls.
 #include <fmt/format.h>
 
+#include <array>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "preprocess/addition/join_series.h"
 #include "preprocess/convert/conversion_journal.h"
+#include "preprocess/seams/thin_walls.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
@@ -65,6 +69,33 @@ void fuzzPartRecord(std::span<const std::byte> bytes) {
 }
 
 const RegisteredFuzzTarget part_record_target("part_record", fuzzPartRecord);
+
+// walls.bin, the sides of thin walls, of a grid of one to three blocks. Each node has the side of a box that it lies in.
+//
+//   blocks u8 | ni nj nk u8 of each | the file
+void fuzzThinWalls(std::span<const std::byte> bytes) {
+  FuzzInput input(bytes);
+  std::vector<GridBlock> blocks(1 + input.take<uint8_t>() % 3);
+  for (GridBlock& block : blocks)
+    for (uint64_t* const count : {&block.ni, &block.nj, &block.nk}) *count = 2 + input.take<uint8_t>() % 6;
+  const ThinWalls walls = ThinWalls::read(input.rest(), blocks, "walls.bin");
+  std::vector<WallSide> boxes(input.rest().size() / sizeof(WallSide));
+  for (WallSide& box : boxes) box = input.take<WallSide>();
+  uint64_t node = 0;
+  for (uint32_t block = 0; block < blocks.size(); ++block)
+    for (uint64_t n = 0; n < blocks[block].nodes(); ++n, ++node) {
+      const uint64_t row = n / blocks[block].ni;
+      const std::array<uint64_t, 3> at{n % blocks[block].ni, row % blocks[block].nj, row / blocks[block].nj};
+      std::set<uint32_t> sides;
+      for (const WallSide& box : boxes)
+        if (box.block == block && at[0] >= box.first[0] && at[0] <= box.last[0] && at[1] >= box.first[1] &&
+            at[1] <= box.last[1] && at[2] >= box.first[2] && at[2] <= box.last[2])
+          sides.insert(box.side);
+      CURVISPLAT_CHECK(sides.empty() ? walls.sideOf(node) == 0 : sides.contains(walls.sideOf(node)));
+    }
+}
+
+const RegisteredFuzzTarget thin_walls_target("thin_walls", fuzzThinWalls);
 
 }  // namespace
 }  // namespace curvisplat

@@ -5,6 +5,7 @@
 
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
+#include "stream/base/watched_file.h"
 #include "tests/support/cgns_writer.h"
 #include "tests/support/damaged_files.h"
 #include "tests/support/earth_files.h"
@@ -61,6 +62,28 @@ TEST_P(CgnsDamage, FilesThatAreCutWhileTheyAreOpenAreRefused) {
   EXPECT_GT(allNodes(*grid, 0).x.size(), 0u);
   std::filesystem::resize_file(path_, 700);
   EXPECT_NE(errorOf([&] { allNodes(*grid, 0); }).find(path_.string()), std::string::npos);
+}
+
+TEST_P(CgnsDamage, FilesThatLinksLeadToAreWatchedToo) {
+  const std::filesystem::path linking = folder_ / "flow.cgns";
+  {
+    CgnsWriter file(linking, GetParam());
+    file.base("Base");
+    file.zone("Zone", {5, 4, 3});
+    file.link("GridCoordinates", "grid.cgns", "/Base/Zone/GridCoordinates");
+  }
+  const std::unique_ptr<GridSource> grid = open(linking);
+  const WatchedFiles files(grid->description().files);
+  EXPECT_GT(allNodes(*grid, 0).x.size(), 0u);
+  std::filesystem::resize_file(path_, 700);
+  const std::string error = errorOf([&] { allNodes(*grid, 0); });
+  EXPECT_NE(error.find(GetParam() == CgnsFileType::kHdf5 ? path_.string() : linking.string()),
+            std::string::npos)
+      << error;
+  std::vector<std::string> warnings;
+  files.warn(warnings);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].find(path_.string() + ": was changed"), 0u);
 }
 
 TEST_P(CgnsDamage, TruncatedFilesAreNamedBeforeALibrarySeesThem) {

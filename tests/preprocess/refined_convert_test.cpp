@@ -12,6 +12,7 @@
 
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/convert/convert.h"
+#include "preprocess/convert/preflight.h"
 #include "preprocess/grid/grid_views.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/cache/cache_reader.h"
@@ -24,6 +25,17 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMemory = uint64_t{512} << 20;
+
+/// The faces between 100,000 blocks, which took 35 s of processor time, cost more than their 2.7 M nodes.
+TEST(ConversionEstimate, HasTheFacesOfManyBlocks) {
+  constexpr uint64_t kNodes = 27 * 100'000;
+  const std::vector<GridBlock> blocks(100'000, GridBlock{"block", 3, 3, 3}), one{{"block", 27, 100, 1000}};
+  const double seconds = estimateConversion(kNodes, 1, SplatsOf::kGrid, blocks).seconds;
+  EXPECT_GT(seconds, 35 / 1.5);
+  EXPECT_LT(seconds, 35 * 1.5);
+  EXPECT_EQ(estimateConversion(kNodes, 1, SplatsOf::kGrid, one).seconds,
+            estimateConversion(kNodes, 1, SplatsOf::kGrid).seconds);
+}
 
 class RefinedConvert : public testing::Test {
  protected:

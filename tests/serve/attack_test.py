@@ -353,6 +353,47 @@ def no_descriptors(server):
     draws(server, "a lack of descriptors")
 
 
+def changing_cache():
+    """While a cache is served it gets a scalar and a time step, is damaged, and is replaced: the next viewer is shown that, and one that
+    was connected before goes on."""
+    def run(*words):
+        subprocess.run([program, *words], check=True, capture_output=True)
+
+    def facts():
+        viewer = Viewer(server)
+        viewer.open()
+        viewer.socket.close()
+        return [scalar["name"] for scalar in viewer.facts["scalars"]], len(viewer.facts["times"]), viewer.facts["samples"]
+
+    def draws_on(what):
+        before.view()
+        expect(isinstance(before.picture(), bytes), f"a viewer from before draws after {what}")
+
+    cache, manifest = f"{folder}/wake.splats", pathlib.Path(folder, "wake.splats", "manifest.json")
+    run("generate", "wake", "--size", "24x16x12", "--steps", "2", "-o", f"{folder}/w")
+    run("convert", f"{folder}/w.xyz", f"{folder}/w_0000.fun", "-o", cache, "--refine", "1")
+    with serving(program, [cache]) as server:
+        before = Viewer(server)
+        name = before.open()["scalars"][0]["name"]
+        draws_on("nothing")
+        run("convert", "--add-scalar", "volume", f"{folder}/w.xyz", f"{folder}/w_0000.fun", "--to", cache)
+        expect(facts() == ([name, "volume"], 1, 24 * 16 * 12), f"the new scalar is shown: {facts()}")
+        draws_on("a scalar")
+        run("convert", "--add-steps", f"{folder}/w.xyz", f"{folder}/w_0001.fun", "--to", cache)
+        expect(facts()[1] == 2, f"the new step is shown: {facts()}")
+        draws_on("a step")
+        before.view(step=1)
+        expect(before.picture() == "there is no step 1; the last one is 0", "a viewer from before has the steps from before")
+        whole = manifest.read_bytes()
+        manifest.write_bytes(whole[:100])
+        expect(facts()[1] == 2 and "as it was before" in server.messages(), f"a damaged cache stays as it was: {server.messages()}")
+        manifest.write_bytes(whole)
+        run("generate", "wake", "--size", "20x16x12", "-o", f"{folder}/other")
+        run("convert", f"{folder}/other.xyz", f"{folder}/other.fun", "-o", cache, "--overwrite", "--refine", "1")
+        expect(facts() == ([name], 1, 20 * 16 * 12), f"the cache in its place is shown: {facts()}")
+        draws_on("the end of its cache")
+
+
 with tempfile.TemporaryDirectory() as folder:
     subprocess.run([program, "generate", "half-annulus", "--size", "40x20x20", "-o", f"{folder}/g"], check=True, capture_output=True)
     subprocess.run([program, "convert", f"{folder}/g.xyz", f"{folder}/g.fun", "-o", f"{folder}/secret place.splats"], check=True, capture_output=True)
@@ -378,6 +419,8 @@ with tempfile.TemporaryDirectory() as folder:
     with serving(program, caches) as server:
         taken = subprocess.run([program, "serve", *caches, "--port", str(server.port)], capture_output=True, text=True)
         expect(taken.returncode == 1 and "--port" in taken.stderr, f"a taken port: {taken.stderr}")
+
+    changing_cache()
 
 print(f"{len(failures)} failures")
 sys.exit(1 if failures else 0)

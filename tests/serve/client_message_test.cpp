@@ -17,11 +17,12 @@ namespace {
 
 TEST(ErrorText, HasNeitherFoldersNorOptionsOfTheServer) {
   const std::string cache = CURVISPLAT_TEST_DATA "/caches/version_2/blocks.splats";
-  const ServedCaches caches({cache});
-  EXPECT_EQ(caches.errorText(cache + "/geometry.bin: is truncated"),
+  ServedFolders folders({cache});
+  const auto caches = folders.caches();
+  EXPECT_EQ(caches->errorText(cache + "/geometry.bin: is truncated"),
             R"({"type":"error","text":"blocks/geometry.bin: is truncated"})");
   EXPECT_EQ(
-      caches.errorText("OpenGL has no memory left; give --backend cpu"),
+      caches->errorText("OpenGL has no memory left; give --backend cpu"),
       R"({"type":"error","text":"OpenGL has no memory left; have the server started with --backend cpu"})");
 }
 
@@ -110,7 +111,7 @@ TEST(Access, TokenFilesAreTheirOwnersAlone) {
 
 template <typename T>
 T parsed(const std::string& text) {
-  return std::get<T>(parseClientMessage(text, 2));
+  return std::get<T>(parseClientMessage(text));
 }
 
 TEST(ClientMessage, IsReadWithEachType) {
@@ -159,7 +160,7 @@ TEST(ClientMessage, IsReadWithEachType) {
 
 TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
   const auto refuses = [](const std::string& text, const std::string& place) {
-    const std::string error = errorOf([&] { parseClientMessage(text, 2); });
+    const std::string error = errorOf([&] { parseClientMessage(text); });
     EXPECT_TRUE(error.starts_with("message: " + place)) << text << ": " << error;
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
     EXPECT_LT(error.size(), 300u);
@@ -170,7 +171,6 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
   refuses("{}", "type is missing");
   refuses(R"({"type": 3})", "type");
   refuses(R"({"type": "read_file"})", "type");
-  refuses(R"({"type": "open", "cache": 2, "size": [1, 1]})", "cache");
   refuses(R"({"type": "open", "cache": -1, "size": [1, 1]})", "cache");
   refuses(R"({"type": "open", "cache": 0.5, "size": [1, 1]})", "cache");
   for (const char* size : {"[0, 1]", "[1, 4097]", "[4096, 4096]", "[1]", "[1, 1, 1]", "\"1x1\"", "null"})

@@ -65,6 +65,23 @@ TEST_F(WatchedFileTest, IsNotWholeWhenItsNameIsGivenToAnotherButWhenItGoes) {
   EXPECT_TRUE(file.isWhole());
 }
 
+TEST_F(WatchedFileTest, FilesThatOthersLeadToAreWatchedToo) {
+  const fs::path linked = folder_ / "linked.nc", behind = folder_ / "behind.nc";
+  for (const fs::path& path : {linked, behind}) write(path, "1234");
+  noteLinks(path_, {linked});
+  noteLinks(linked, {behind, path_});  // a cycle
+  const WatchedFiles files({path_.string()});
+  EXPECT_NO_THROW(files.requireWhole());
+  writeLater(behind, "4321");
+  EXPECT_NO_THROW(files.requireWhole());
+  EXPECT_EQ(errorOf([&] { files.requireSame(); }).find(behind.string() + ": was changed"), 0u);
+  std::vector<std::string> warnings;
+  files.warn(warnings);
+  EXPECT_EQ(warnings.size(), 1u);
+  writeLater(linked, "123");
+  EXPECT_EQ(errorOf([&] { files.requireWhole(); }).find(linked.string() + ": was changed"), 0u);
+}
+
 TEST_F(WatchedFileTest, FilesOfAGridThatWereChangedAreNamed) {
   const fs::path other = folder_ / "other.nc", store = folder_ / "store.zarr";
   write(other, "1");

@@ -452,6 +452,19 @@ TEST(RenderCommand, HasEveryOption) {
                                                   "--volume off"});
 }
 
+/// A colour has an effect on files, and on faces that show no scalar. The option is given once, or once for each surface.
+TEST(RenderCommand, HasColoursOfSurfacesThatShowNoScalar) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  state.faces = {{"walls", {0, 1, 0.5f}, {}}};
+  EXPECT_NE(commandText(state).find("--surface-colour"), std::string::npos);
+  state.faces_by = FacesScalar{"density", EditedFunction("magma", 0.5, 2, 0.1)};
+  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}, nullptr, 0.25, false}};
+  EXPECT_EQ(commandText(state).find("--surface-colour"), std::string::npos) << commandText(state);
+  state.surfaces[0].visible = true;
+  EXPECT_NE(commandText(state).find("--surface-colour '#ff8000' --surface-colour '#00ff80'"),
+            std::string::npos);
+}
+
 TEST(RenderCommand, HasMoreMemoryWhereTheViewHas) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   state.memory_bytes = 100 << 20;

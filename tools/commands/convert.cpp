@@ -161,7 +161,8 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
 /// Converts the grid to a new cache and prints a summary. Throws UsageError and Error.
 void runConvert(ConvertArguments arguments) {
   Ranks& ranks = launchedRanks();
-  if (arguments.output.empty()) throw UsageError("--output is required, or --add-scalar with --to");
+  if (arguments.output.empty())
+    throw UsageError("--output is required, or --to CACHE with --add-scalar or --add-steps");
   if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
   // A link stays, as it does where pictures are written through one.
   ConvertOptions options;

@@ -194,12 +194,18 @@ Probe probed(const CacheReader& reader, const std::vector<StepPosition>& positio
     inputs.insert(inputs.end(), {options.grid.grid, source.grid});
     checkOutputFile("-o", options.probe.plot, inputs);
   }
+  bool doubted = false;
   for (const StepPosition& position : positions) {
     ProbedStep of_step{position.step, 0, {}};
     if (position.step < reader.series().steps.size()) {
       const CacheReader at = reader.at(position);
       of_step.time = reader.series().steps[position.step].time;
-      of_step.found = valuesAt(at, probe.asked.points, probe.of_source ? &probe.source : nullptr);
+      std::string doubt;
+      of_step.found = valuesAt(at, probe.asked.points, probe.of_source ? &probe.source : nullptr, &doubt);
+      if (!doubt.empty() && !doubted)
+        printMessage("warning: {}{}", positions.size() > 1 ? fmt::format("step {}: ", position.step) : "",
+                     doubt);
+      doubted |= !doubt.empty();
     } else {
       of_step.found.resize(probe.asked.points.size());
     }
@@ -357,6 +363,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
 }
 
 void printCacheInfo(const InfoOptions& options) {
+  if (options.probe.of_source && !options.probe.any())
+    throw UsageError("--source: is read at points; add --probe X,Y,Z or --probe-line");
   if (!options.grid.solutions.empty())
     throw UsageError("{}: is a splat cache, but solution files were given as well; give only the cache",
                      options.grid.grid.string());
@@ -392,8 +400,8 @@ void printCacheInfo(const InfoOptions& options) {
   size_t findings = 0;
   for (const Findings& of_reader : found) findings += of_reader.verification.findings.size();
   if (findings > 0)
-    throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
-                findings);
+    throw Error("{}: the cache is damaged ({}); convert the grid again", options.grid.grid.string(),
+                countText(findings, "finding"));
   if (options.probe.any() && joined.isOutside()) {
     glm::dvec3 lower = readers[0].manifest().lower, upper = readers[0].manifest().upper;
     for (const CacheReader& reader : readers) {

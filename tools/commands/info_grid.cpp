@@ -54,8 +54,9 @@ GridInfo inspect(const GridSource& source) {
     info.warnings.push_back(std::move(warning));
   info.overlaps = findOverlaps(source, {kSlabBytes, kPointBytes}, progress);
   const bool by_cell = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
-  info.estimate = InfoEstimate(
-      by_cell ? info.statistics.cells() : info.nodes - info.statistics.blank().total(), SplatsOf::kGrid);
+  info.estimate =
+      InfoEstimate(by_cell ? info.statistics.cells() : info.nodes - info.statistics.blank().total(),
+                   SplatsOf::kGrid, description.blocks);
   return info;
 }
 

@@ -21,10 +21,10 @@
 
 namespace curvisplat {
 
-InfoEstimate::InfoEstimate(uint64_t splats, SplatsOf what)
+InfoEstimate::InfoEstimate(uint64_t splats, SplatsOf what, std::span<const GridBlock> blocks)
     : splats_(splats),
       threads_(static_cast<unsigned>(tbb::info::default_concurrency())),
-      needs_(estimateConversion(splats, threads_, what)) {}
+      needs_(estimateConversion(splats, threads_, what, blocks)) {}
 
 nlohmann::ordered_json InfoEstimate::toJson() const {
   return {{"splats", splats_},

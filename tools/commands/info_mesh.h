@@ -17,7 +17,7 @@ namespace curvisplat {
 class InfoEstimate {
  public:
   InfoEstimate() = default;
-  explicit InfoEstimate(uint64_t splats, SplatsOf what);
+  InfoEstimate(uint64_t splats, SplatsOf what, std::span<const GridBlock> blocks = {});
 
   nlohmann::ordered_json toJson() const;
   /// "a cache of about 2.1 MiB with one scalar, ..."

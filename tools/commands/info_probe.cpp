@@ -133,7 +133,13 @@ ProbedPoints parseProbe(const ProbeArguments& arguments) {
   if (!arguments.line.empty()) return parseLine(arguments.line);
   const std::string& text = arguments.at;
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(text, ignored)) return {false, {parsePoint("--probe", text)}, {}};
+  if (!std::filesystem::is_regular_file(text, ignored)) {
+    if (text.find_first_not_of("0123456789.,+-eE ") != std::string::npos &&
+        text.find(',') == std::string::npos)
+      throw UsageError("--probe {}: there is no such file; expected a point x,y,z, or a file of points",
+                       text);
+    return {false, {parsePoint("--probe", text)}, {}};
+  }
   return {true, parsePointList(readTextFile(text, uint64_t{1} << 30), text), {}};
 }
 

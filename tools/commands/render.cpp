@@ -193,6 +193,8 @@ void render(const RenderArguments& given) {
   options.scene =
       sceneOf(arguments.surfaces, cache,
               {shown, variable, !arguments.opacity.by.scalar.empty(), mapsOn(options.background)});
+  if (const std::string idle = surfaceColourWithoutEffect(arguments.surfaces); !idle.empty())
+    printMessage("warning: {}", idle);
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
   if (options.scene)

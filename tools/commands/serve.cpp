@@ -76,18 +76,18 @@ void serve(const ServeArguments& arguments) {
   returnFreedMemory(kLargeBlock);
   const ServerOptions options = optionsFrom(arguments);
   warnOfNetwork(options);
-  const ServedCaches caches(arguments.caches, faceNamesOf);
+  ServedFolders folders(arguments.caches, faceNamesOf);
+  const size_t served = folders.caches()->size();
   requireThreads();
   Progress progress;
   const StopOnSignals stopping(progress);
-  runServer(caches, options, progress, [&](const std::string& address) {
+  runServer(folders, options, progress, [&](const std::string& address) {
     fmt::print("{}\n", address);
     std::fflush(stdout);
     printMessage(
         "serving {} to at most {} at a time; anyone who has the address above can look at "
         "{}",
-        countText(caches.size(), "cache"), countText(options.viewers, "viewer"),
-        caches.size() == 1 ? "it" : "them");
+        countText(served, "cache"), countText(options.viewers, "viewer"), served == 1 ? "it" : "them");
   });
 }
 
@@ -97,7 +97,9 @@ void addServe(CLI::App& app) {
   auto arguments = std::make_shared<ServeArguments>();
   CLI::App* command = app.add_subcommand("serve", "Show caches in a web browser");
   command->add_option("CACHE", arguments->caches, "Splat caches, directories NAME.splats")->required();
-  command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")->capture_default_str();
+  command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")
+      ->check(CLI::Range(0, 65535))
+      ->capture_default_str();
   command
       ->add_option("--listen", arguments->listen,
                    "Address to listen on; any but the loopback's lets other machines connect, unencrypted")

@@ -125,17 +125,6 @@ ConvertArguments argumentsFor(const std::vector<fs::path>& files, const fs::path
   return arguments;
 }
 
-/// Opens the time step of the files that the cache is of.
-std::unique_ptr<DataSource> openStepOf(const CacheReader& reader, ConvertArguments& arguments,
-                                       const fs::path& cache) {
-  std::unique_ptr<DataSource> source = openSource(arguments, cache);
-  if (const auto step = otherStep(reader.manifest(), source->description(), arguments.grid)) {
-    arguments.grid.time_step = step;
-    source = openSource(arguments, cache);
-  }
-  return source;
-}
-
 /// Whether `after` has the values of `before`, as far as ranges and times tell.
 bool hasSameValues(const Manifest& after, const Manifest& before) {
   const auto is_in = [&](const VariableInfo& one) {
@@ -161,7 +150,8 @@ void convertAgainWith(const fs::path& cache, const std::vector<fs::path>& files,
   const PreviewFolder folder(whole.parent_path(), folder_name);  // in the end, of the old one
   arguments.output = folder.path() / whole.filename();
   ConvertOptions options = optionsLike(before, arguments.output).convert;
-  const auto source = openStepOf(before, arguments, arguments.output);
+  const auto source =
+      openStepOf(before.manifest(), arguments.grid, [&] { return openSource(arguments, arguments.output); });
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
   options.differing = DifferingScalars::kKeepApart;
   const ConvertReport report = convert(*source, options, progress);
@@ -237,7 +227,8 @@ void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files,
   if (isSeries(CacheReader(cache))) return addScalarToSeries(cache, files, name, progress);
   ConvertArguments arguments = argumentsFor(files, cache);
   arguments.added_scalars = {name};
-  const auto source = openStepOf(CacheReader(cache), arguments, cache);
+  const auto source =
+      openStepOf(CacheReader(cache).manifest(), arguments.grid, [&] { return openSource(arguments, cache); });
   AddScalarOptions options;
   options.cache = cache;
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());

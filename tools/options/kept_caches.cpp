@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <fnmatch.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -30,6 +29,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
+#include "stream/base/watched_file.h"
 #include "tools/options/further_scalars.h"
 #include "tools/options/option_parsers.h"
 
@@ -46,12 +46,10 @@ uint64_t checksumOfText(const std::string& text) {
   return checksumOf(std::as_bytes(std::span(text)));
 }
 
-/// A stamp that tells whether a file is unchanged, without reading it.
+/// A file's state, as notes have it.
 std::string stampOf(const fs::path& file) {
-  struct stat found {};
-  if (::stat(file.c_str(), &found) != 0) return {};
-  return fmt::format("{} {} {} {} {}", found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec,
-                     found.st_ino, found.st_dev);
+  const FileState state = FileState::of(file);
+  return fmt::format("{} {} {} {}", state.bytes, state.changed_ns, state.number, state.device);
 }
 
 uint64_t checksumOfFile(const fs::path& path, Progress& progress) {

@@ -73,11 +73,7 @@ void setGlobe(const Manifest& manifest, GlobeOptions& options) {
 
 bool describesAll(const Manifest& manifest, OpenGridOptions options, const std::vector<fs::path>& files) {
   try {
-    std::unique_ptr<DataSource> source = openData(options);
-    if (const auto step = otherStep(manifest, source->description(), options)) {
-      options.time_step = step;
-      source = openData(options);
-    }
+    const auto source = openStepOf(manifest, options, [&] { return openData(options); });
     const auto plain = [](const fs::path& path) { return fs::absolute(path).lexically_normal(); };
     std::set<fs::path> named;
     for (const std::string& file : source->description().files) named.insert(plain(file));
@@ -123,16 +119,43 @@ std::vector<std::optional<SourceValues>> sourceValues(const CacheReader& reader,
                    near);
 }
 
+/// See valuesAt(). The cache has the means of cells, and straight lines between: where a value leaps within a cell, it is far
+/// from the source's.
+std::string doubtOf(const Manifest& manifest, std::span<const glm::dvec3> points,
+                    std::span<const std::optional<ProbeResult>> of_cache,
+                    std::span<const std::optional<SourceValues>> of_source) {
+  constexpr double kFar = 0.1;   // of the scalar's range
+  constexpr size_t kOneIn = 10;  // points
+  for (size_t v = 0; v < manifest.variables.size(); ++v) {
+    const VariableInfo& variable = manifest.variables[v];
+    size_t compared = 0, far = 0;
+    std::string first;
+    for (size_t p = 0; p < points.size(); ++p) {
+      if (!of_cache[p] || of_cache[p]->is_beyond || !of_source[p]) continue;
+      const double here = of_cache[p]->variables[v].value, there = of_source[p]->values[v];
+      ++compared;
+      if (!(std::abs(here - there) > kFar * (variable.max - variable.min))) continue;
+      if (++far == 1)
+        first = fmt::format("{} at {:g}, {:g}, {:g} is {:g} in the cache and {:g} in the files of --source",
+                            variable.name, points[p].x, points[p].y, points[p].z, here, there);
+    }
+    if (kOneIn * far > compared) return first + "; they may be of another time step";
+  }
+  return "";
+}
+
 }  // namespace
 
-std::optional<uint32_t> otherStep(const Manifest& manifest, const GridDescription& description,
-                                  const OpenGridOptions& options) {
-  const std::vector<double>& times = description.times;
+std::unique_ptr<DataSource> openStepOf(const Manifest& manifest, OpenGridOptions& options,
+                                       const std::function<std::unique_ptr<DataSource>()>& open) {
+  std::unique_ptr<DataSource> source = open();
+  const std::vector<double>& times = source->description().times;
   const double time = manifest.steps.front().time;
-  if (options.time_step || times.size() < 2 || std::ranges::count(times, time) != 1) return std::nullopt;
+  if (options.time_step || times.size() < 2 || std::ranges::count(times, time) != 1) return source;
   const auto step = static_cast<uint32_t>(std::ranges::find(times, time) - times.begin());
-  if (step == description.time_step) return std::nullopt;
-  return step;
+  if (step == source->description().time_step) return source;
+  options.time_step = step;
+  return open();
 }
 
 std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache) {
@@ -170,11 +193,7 @@ OpenSource openSource(const CacheReader& reader, const PointSource& source) {
     opened.ranges.push_back({variable.min, variable.max});
   }
   const DerivedOptions derived{source.gas, std::nullopt};
-  opened.grid = openWithDerived(options, derived);
-  if (const auto step = otherStep(reader.manifest(), opened.grid->description(), options)) {
-    options.time_step = step;
-    opened.grid = openWithDerived(options, derived);
-  }
+  opened.grid = openStepOf(reader.manifest(), options, [&] { return openWithDerived(options, derived); });
   const GridDescription& description = opened.grid->description();
   opened.scalars = scalarsLike(reader, description, source.grid);
   if (dynamic_cast<const MeshSource*>(opened.grid.get()))
@@ -186,13 +205,14 @@ OpenSource openSource(const CacheReader& reader, const PointSource& source) {
 
 std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
                                                  std::span<const glm::dvec3> points,
-                                                 const PointSource* source) {
+                                                 const PointSource* source, std::string* doubt) {
   std::vector<size_t> variables(reader.manifest().variables.size());
   std::iota(variables.begin(), variables.end(), size_t{0});
   const auto found = probeAll(reader, variables, points);
   std::vector<std::optional<PointValues>> all(points.size());
   if (source) {
     const auto of_source = sourceValues(reader, *source, points, found);
+    if (doubt) *doubt = doubtOf(reader.manifest(), points, found, of_source);
     for (size_t p = 0; p < points.size(); ++p)
       if (const auto& at = of_source[p])
         all[p] = {at->block,

@@ -5,9 +5,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
@@ -27,9 +29,10 @@ std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std
 void setSource(const CacheReader& reader, const std::vector<std::filesystem::path>& files,
                OpenGridOptions& grid);
 
-/// The time step of the files whose time the cache has, if it is another one than was opened and none was asked for.
-std::optional<uint32_t> otherStep(const Manifest& manifest, const GridDescription& description,
-                                  const OpenGridOptions& options);
+/// Calls `open`, which opens the files of `options`. If these have the cache's time at another time step than the one that is
+/// opened, and none was asked for, sets options.time_step and calls it again.
+std::unique_ptr<DataSource> openStepOf(const Manifest& manifest, OpenGridOptions& options,
+                                       const std::function<std::unique_ptr<DataSource>()>& open);
 
 /// The source of exact values, beside a cache.
 struct PointSource {
@@ -59,10 +62,11 @@ struct PointValues {
 };
 
 /// The values at each point, from the cache or, with a source, from the grid's own cell there; nullopt
-/// outside of the data. Throws Error as reading does, and if the source is not the grid of the cache.
+/// outside of the data. Throws Error as reading does, and if the source is not the grid of the cache. Sets `doubt`, if given,
+/// to a text if the source has other values there than the cache, as the files of another time step have.
 std::vector<std::optional<PointValues>> valuesAt(const CacheReader& reader,
                                                  std::span<const glm::dvec3> points,
-                                                 const PointSource* source);
+                                                 const PointSource* source, std::string* doubt = nullptr);
 
 /// The values of a set of scalars (a cache's own, or CacheReader::ownBlanks()) at points: valuesAt().
 struct SetValues {

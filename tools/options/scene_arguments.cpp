@@ -300,6 +300,15 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
     throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface, an --iso or --lines");
 }
 
+std::string surfaceColourWithoutEffect(const SurfaceArguments& arguments) {
+  if (arguments.colours.empty() || arguments.surface_by.empty() ||
+      std::ranges::any_of(arguments.surfaces, isSurfaceFile))
+    return "";
+  return fmt::format(
+      "--surface-colour {}: has no effect, since --surface-by {} colours the faces; leave one of them out",
+      arguments.colours.front(), arguments.surface_by);
+}
+
 std::vector<std::string> isoScalars(const SurfaceArguments& arguments) {
   std::vector<std::string> scalars;
   for (const GivenIsovalue& given : parseIsovalues(arguments)) scalars.push_back(given.scalar);

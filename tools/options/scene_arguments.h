@@ -58,6 +58,9 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
 /// picture has a scalar of its opacities, which surfaces may have as well.
 void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities = false);
 
+/// A warning if --surface-colour has no effect, since --surface-by colours all surfaces; else empty.
+std::string surfaceColourWithoutEffect(const SurfaceArguments& arguments);
+
 /// The scalars that --iso names; empty names stand for the picture's.
 std::vector<std::string> isoScalars(const SurfaceArguments& arguments);
 

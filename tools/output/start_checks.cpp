@@ -58,9 +58,11 @@ void checkOutputFile(std::string_view option, const std::filesystem::path& path,
   for (const fs::path& other : others) {
     if (other.empty()) continue;
     const fs::path there = fs::weakly_canonical(linkTarget(other), ignored);
-    if (there == target || fs::equivalent(target, there, ignored) ||
-        fs::equivalent(target.parent_path(), there, ignored))
+    if (there == target || fs::equivalent(target, there, ignored))
       throw Error("{} {}: would overwrite {}; choose another name", option, path.string(), other.string());
+    if (fs::equivalent(target.parent_path(), there, ignored))
+      throw Error("{} {}: lies in {}, which is read; choose another folder", option, path.string(),
+                  other.string());
   }
 }
 

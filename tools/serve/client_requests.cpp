@@ -112,8 +112,8 @@ namespace {
 constexpr uint64_t kMaxNumber = uint64_t{1} << 53;  // what JavaScript counts to
 constexpr size_t kLongestName = 1000;
 
-size_t cacheIn(const JsonField& message, size_t caches) {
-  return message.at("cache").count(0, caches - 1);
+size_t cacheIn(const JsonField& message) {
+  return message.at("cache").count(0, kMaxNumber);
 }
 
 ImageSize sizeIn(const JsonField& message) {
@@ -140,10 +140,10 @@ std::string stateIn(const JsonField& message) {
   return state.json().dump();
 }
 
-ViewRequest viewIn(const JsonField& message, size_t caches) {
+ViewRequest viewIn(const JsonField& message) {
   ViewRequest view;
   view.number = message.at("number").count(0, kMaxNumber);
-  view.cache = cacheIn(message, caches);
+  view.cache = cacheIn(message);
   view.size = sizeIn(message);
   view.moving = message.at("moving").flag();
   if (const auto saves = message.find("saves")) view.saves = saves->flag();
@@ -153,13 +153,13 @@ ViewRequest viewIn(const JsonField& message, size_t caches) {
   return view;
 }
 
-FunctionRequest functionIn(const JsonField& message, size_t caches) {
+FunctionRequest functionIn(const JsonField& message) {
   const auto dark = message.find("dark");
-  return {cacheIn(message, caches), nameIn(message, "scalar"), !dark || dark->flag()};
+  return {cacheIn(message), nameIn(message, "scalar"), !dark || dark->flag()};
 }
 
-HistogramRequest histogramIn(const JsonField& message, size_t caches) {
-  HistogramRequest histogram{cacheIn(message, caches), nameIn(message, "scalar"), message.at("low").number(),
+HistogramRequest histogramIn(const JsonField& message) {
+  HistogramRequest histogram{cacheIn(message), nameIn(message, "scalar"), message.at("low").number(),
                              message.at("high").number(), message.at("log").flag()};
   const double width = histogram.high - histogram.low;
   if (!(width > 0 && width < 1e300)) message.at("high").fail("more than low");
@@ -169,31 +169,31 @@ HistogramRequest histogramIn(const JsonField& message, size_t caches) {
 
 }  // namespace
 
-ClientMessage parseClientMessage(std::string_view text, size_t caches) {
+ClientMessage parseClientMessage(std::string_view text) {
   if (text.size() > kLongestMessage)
     throw Error("message: is too long (found {} bytes, expected at most {})", text.size(), kLongestMessage);
   const JsonDocument document(text, "message", "an object with a type");
   const JsonField message = document.root();
   const JsonField type = message.at("type");
   const std::string name = type.text();
-  if (name == "open") return OpenRequest{cacheIn(message, caches), sizeIn(message)};
-  if (name == "view") return viewIn(message, caches);
-  if (name == "choose") return functionIn(message, caches);
-  if (name == "histogram") return histogramIn(message, caches);
+  if (name == "open") return OpenRequest{cacheIn(message), sizeIn(message)};
+  if (name == "view") return viewIn(message);
+  if (name == "choose") return functionIn(message);
+  if (name == "histogram") return histogramIn(message);
   if (name == "colours") {
     ColoursRequest colours{nameIn(message, "map")};
     if (const auto parts = message.find("parts")) colours.parts = functionPartsFrom(*parts);
     return colours;
   }
   if (name == "isosurface")
-    return IsosurfaceRequest{cacheIn(message, caches), message.at("step").count(0, kMaxNumber),
+    return IsosurfaceRequest{cacheIn(message), message.at("step").count(0, kMaxNumber),
                              nameIn(message, "scalar"), stateIn(message)};
   if (name == "pick") {
     const auto hovers = message.find("hovers");
     return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1), hovers && hovers->flag()};
   }
   if (name == "command")
-    return CommandRequest{cacheIn(message, caches), sizeIn(message), message.at("step").count(0, kMaxNumber),
+    return CommandRequest{cacheIn(message), sizeIn(message), message.at("step").count(0, kMaxNumber),
                           stateIn(message)};
   if (name == "shown") return ShownReport{message.at("picture").count(0, kMaxNumber)};
   type.fail("open, view, choose, histogram, colours, isosurface, pick, command or shown");

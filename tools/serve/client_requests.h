@@ -6,7 +6,7 @@
 // machine.
 //
 // A page sends JSON texts, one message each, with a "type". Messages are checked here as far as that can be
-// done without a cache; viewStateFromJson() checks the state of a view against the cache's manifest.
+// done without a cache: ServedCaches checks its number, viewStateFromJson() the state of a view against its manifest.
 //
 //   {"type": "open", "cache": 0,                 asks for a cache's facts and its first view
 //    "size": [800, 600]}
@@ -136,9 +136,8 @@ using ClientMessage =
     std::variant<OpenRequest, ViewRequest, FunctionRequest, HistogramRequest, ColoursRequest,
                  IsosurfaceRequest, PickRequest, CommandRequest, ShownReport>;
 
-/// Parses and checks a message. `caches`: how many are served. Throws Error that begins with "message" for
-/// any other text.
-ClientMessage parseClientMessage(std::string_view text, size_t caches);
+/// Parses and checks a message. Throws Error that begins with "message" for any other text.
+ClientMessage parseClientMessage(std::string_view text);
 
 /// Limits how many messages a page may send, by a token bucket. While its camera moves, a page sends two
 /// messages in each frame of its screen, and screens have up to 240 frames a second. A value type.

@@ -169,9 +169,9 @@ void Connection::receive() {
   if (!rate_.admits(clockSeconds())) return close(websocket::close_code::policy_error, "too many messages");
   if (!socket_.got_text()) return close(websocket::close_code::unknown_data, "expected text");
   try {
-    viewer_->receive(parseClientMessage(beast::buffers_to_string(buffer_.data()), host_.caches().size()));
+    viewer_->receive(parseClientMessage(beast::buffers_to_string(buffer_.data())));
   } catch (const Error& error) {
-    send(host_.caches().errorText(error.what()), true);
+    send(ServedCaches::refusalText(error.what()), true);
   }
   buffer_.consume(buffer_.size());
   if (!closing_) read();

@@ -28,7 +28,6 @@ class Connection;
 class ConnectionHost {
  public:
   virtual ~ConnectionHost() = default;
-  virtual const ServedCaches& caches() const = 0;
   virtual const ServerOptions& options() const = 0;
   /// A new viewer, or nullptr if there are as many as may be. Its messages go to `connection`, as long as that lives.
   virtual std::unique_ptr<RemoteViewer> newViewer(const std::shared_ptr<Connection>& connection) = 0;

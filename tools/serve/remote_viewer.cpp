@@ -67,7 +67,8 @@ PictureMemory memoryFor(ImageSize picture, const Annotations& annotations, uint6
 /// The part of a viewer that belongs to its thread.
 class RemoteViewer::Work {
  public:
-  explicit Work(RemoteViewer& viewer) : viewer_(viewer), caches_(viewer.caches_), limits_(viewer.limits_) {}
+  Work(RemoteViewer& viewer, const ServedCaches& caches)
+      : viewer_(viewer), caches_(caches), limits_(viewer.limits_) {}
 
   /// Answers what has come in.
   void serve(Inbox inbox) {
@@ -143,8 +144,8 @@ class RemoteViewer::Work {
   }
 
   void ask(const ViewRequest& view) {
-    const CacheReader& reader = caches_.reader(view.cache);
     try {
+      const CacheReader& reader = caches_.reader(view.cache);
       if (view.step >= reader.series().steps.size())
         throw UsageError("there is no step {}; the last one is {}", view.step,
                          reader.series().steps.size() - 1);
@@ -330,8 +331,8 @@ class RemoteViewer::Work {
   std::unique_ptr<FrameLoop> frames_;        // the last: its thread calls wake()
 };
 
-RemoteViewer::RemoteViewer(const ServedCaches& caches, const ViewerLimits& limits, Send send)
-    : caches_(caches), limits_(limits), send_(std::move(send)), thread_([this] { loop(); }) {}
+RemoteViewer::RemoteViewer(ServedFolders& folders, const ViewerLimits& limits, Send send)
+    : folders_(folders), limits_(limits), send_(std::move(send)), thread_([this] { loop(); }) {}
 
 RemoteViewer::~RemoteViewer() {
   {
@@ -374,8 +375,9 @@ void RemoteViewer::wake() {
 
 void RemoteViewer::loop() {
   nameThisThread("viewer");
-  Work work(*this);
-  send_(caches_.helloText(), true);
+  const std::shared_ptr<const ServedCaches> caches = folders_.caches();
+  Work work(*this, *caches);
+  send_(caches->helloText(), true);
   while (true) {
     Inbox inbox;
     {
@@ -389,7 +391,7 @@ void RemoteViewer::loop() {
       work.serve(std::move(inbox));
     } catch (const std::exception& error) {  // such as a lack of memory: of this viewer alone
       printMessage("warning: a viewer: {}", error.what());
-      send_(caches_.errorText("the server could not do this; the reason is in its messages (standard error)"),
+      send_(caches->errorText("the server could not do this; the reason is in its messages (standard error)"),
             true);
     }
   }

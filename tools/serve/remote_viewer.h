@@ -50,8 +50,8 @@ class RemoteViewer {
   /// Sends a message: a text, or bytes. Called on the viewer's thread.
   using Send = std::function<void(std::string message, bool is_text)>;
 
-  /// `caches` must outlive it.
-  RemoteViewer(const ServedCaches& caches, const ViewerLimits& limits, Send send);
+  /// Shows the caches as they are now. `folders` must outlive it.
+  RemoteViewer(ServedFolders& folders, const ViewerLimits& limits, Send send);
   /// Stops the picture being drawn, and waits for it.
   ~RemoteViewer();
   RemoteViewer(const RemoteViewer&) = delete;
@@ -77,7 +77,7 @@ class RemoteViewer {
   void loop();
   void wake();
 
-  const ServedCaches& caches_;
+  ServedFolders& folders_;
   const ViewerLimits limits_;
   const Send send_;
 

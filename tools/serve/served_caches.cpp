@@ -67,34 +67,64 @@ size_t variableOf(const CacheReader& reader, const std::string& name, const std:
 
 }  // namespace
 
-ServedCaches::ServedCaches(const std::vector<fs::path>& paths, const FacesOf& faces) {
-  const auto add = [&](std::string name, CacheReader reader) {
+ServedFolders::ServedFolders(const std::vector<fs::path>& paths, FacesOf faces) : faces_(std::move(faces)) {
+  for (const fs::path& path : paths) {
+    const std::string name = nameOf(path);
+    const auto same =
+        std::ranges::count(folders_, nameOf(path), [](const Folder& one) { return nameOf(one.path); });
+    folders_.push_back({path, same > 0 ? fmt::format("{} ({})", name, same + 1) : name, {}, {}});
+    open(folders_.back());
+  }
+}
+
+void ServedFolders::open(Folder& folder) const {
+  // Before it is read: it may change meanwhile.
+  const FileState manifest = FileState::of(folder.path / "manifest.json");
+  ServedCaches::All caches;
+  const auto add = [&](const std::string& name, CacheReader reader) {
     ViewState first = firstViewOf(reader, "", kFirstSize);
-    std::vector<std::string> names;
-    if (faces) try {
-        names = faces(reader);
+    std::vector<std::string> faces;
+    if (faces_) try {
+        faces = faces_(reader);
       } catch (const Error& error) {
         printMessage("warning: {}: its faces cannot be shown: {}", name, error.what());
       }
-    caches_.push_back({std::move(name), std::move(reader), std::move(first), std::move(names)});
+    caches.push_back(std::make_shared<ServedCache>(
+        ServedCache{name, std::move(reader), std::move(first), std::move(faces)}));
   };
-  std::vector<std::string> names;
-  for (const fs::path& path : paths) {
-    std::string name = nameOf(path);
-    const auto same = std::ranges::count(names, name);
-    names.push_back(name);
-    if (same > 0) name += fmt::format(" ({})", same + 1);
-    const CacheReader reader(path);
-    add(name, reader.at(reader.position()));
-    const std::vector<OwnBlanks>& sets = reader.seriesManifest().own_blanks;
-    for (size_t n = 0; n < sets.size(); ++n)
-      add(fmt::format("{}: {}", name, listed(sets[n].variables)), reader.ownBlanks(n));
+  const CacheReader reader(folder.path);
+  add(folder.name, reader.at(reader.position()));
+  const std::vector<OwnBlanks>& sets = reader.seriesManifest().own_blanks;
+  for (size_t n = 0; n < sets.size(); ++n)
+    add(fmt::format("{}: {}", folder.name, listed(sets[n].variables)), reader.ownBlanks(n));
+  folder.manifest = manifest;
+  folder.caches = std::move(caches);
+}
+
+std::shared_ptr<const ServedCaches> ServedFolders::caches() {
+  const MutexLock lock(opening_);
+  ServedCaches::All all;
+  for (Folder& folder : folders_) {
+    if (folder.manifest != FileState::of(folder.path / "manifest.json")) try {
+        const MutexLock reading(reading_);
+        open(folder);
+      } catch (const std::exception& error) {
+        printMessage("warning: {}; viewers are shown the cache as it was before", error.what());
+      }
+    all.insert(all.end(), folder.caches.begin(), folder.caches.end());
   }
+  return std::make_shared<const ServedCaches>(std::move(all), reading_);
+}
+
+const ServedCache& ServedCaches::at(size_t cache) const {
+  if (cache >= caches_.size())
+    throw UsageError("there is no cache {}; the last one is {}", cache, caches_.size() - 1);
+  return *caches_[cache];
 }
 
 /// The width of the data's part of a picture to its height, in the first view.
 double ServedCaches::aspectOf(size_t cache, ImageSize picture) const {
-  const Served& served = caches_[cache];
+  const ServedCache& served = at(cache);
   const ImageSize data = dataSizeOf(served.first, served.reader.manifest(), picture);
   return static_cast<double>(data.width) / data.height;
 }
@@ -102,7 +132,7 @@ double ServedCaches::aspectOf(size_t cache, ImageSize picture) const {
 /// The camera was chosen for the usual shape of a window; in a narrower one it is further away, and sees as much of the
 /// data's width.
 ViewState ServedCaches::firstView(size_t cache, ImageSize size) const {
-  ViewState state = caches_[cache].first;
+  ViewState state = at(cache).first;
   const double narrower = std::max(1.0, aspectOf(cache, kFirstSize) / aspectOf(cache, size));
   Camera& camera = state.camera;
   camera.parallel_scale *= narrower;
@@ -113,7 +143,7 @@ ViewState ServedCaches::firstView(size_t cache, ImageSize size) const {
 std::string ServedCaches::helloText() const {
   Json json = {{"type", "hello"}, {"program", "curvisplat " CURVISPLAT_VERSION}};
   json["caches"] = Json::array();
-  for (const Served& cache : caches_) json["caches"].push_back(cache.name);
+  for (const auto& cache : caches_) json["caches"].push_back(cache->name);
   json["maps"] = Json::array();
   for (const PublishedMap& map : builtInMaps()) {
     const EditedFunction function(std::string(map.name), 0, 1, 1);
@@ -125,7 +155,7 @@ std::string ServedCaches::helloText() const {
 }
 
 std::string ServedCaches::cacheText(const OpenRequest& request) const {
-  const Served& cache = caches_[request.cache];
+  const ServedCache& cache = at(request.cache);
   const Manifest& manifest = cache.reader.manifest();
   Json json = {{"type", "cache"}, {"cache", request.cache}, {"name", cache.name}};
   json["lower"] = jsonOf(manifest.lower);
@@ -155,7 +185,7 @@ std::string ServedCaches::cacheText(const OpenRequest& request) const {
 }
 
 std::string ServedCaches::functionText(const FunctionRequest& request) const {
-  const Served& cache = caches_[request.cache];
+  const ServedCache& cache = at(request.cache);
   variableOf(cache.reader, cache.name, request.scalar);
   const MutexLock lock(reading_);
   Json json = {{"type", "function"}, {"cache", request.cache}, {"scalar", request.scalar}};
@@ -166,7 +196,7 @@ std::string ServedCaches::functionText(const FunctionRequest& request) const {
 }
 
 std::string ServedCaches::histogramText(const HistogramRequest& request) const {
-  const Served& cache = caches_[request.cache];
+  const ServedCache& cache = at(request.cache);
   const size_t variable = variableOf(cache.reader, cache.name, request.scalar);
   const MutexLock lock(reading_);
   Json json = {{"type", "histogram"}, {"cache", request.cache}, {"scalar", request.scalar},
@@ -182,14 +212,14 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
 
 std::string ServedCaches::finerText(uint64_t number, const AskedStep& asked) const {
   const MutexLock lock(reading_);
-  const CacheReader reader = caches_[asked.cache].reader.atStep(asked.step);
+  const CacheReader reader = at(asked.cache).reader.atStep(asked.step);
   return textOf(
       {{"type", "finer"}, {"number", number}, {"texts", finerThanStored(reader, asked.differences)}});
 }
 
 std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& scalar,
                                      const std::optional<glm::dvec3>& point) const {
-  const Served& cache = caches_[cache_number];
+  const ServedCache& cache = at(cache_number);
   const size_t variable = variableOf(cache.reader, cache.name, scalar.name);
   const MutexLock lock(reading_);
   const CacheReader reader = cache.reader.atStep(scalar.step);
@@ -224,7 +254,7 @@ std::string ServedCaches::coloursText(const ColoursRequest& request) {
 }
 
 std::string ServedCaches::isosurfaceText(const IsosurfaceRequest& request) const {
-  const Served& cache = caches_[request.cache];
+  const ServedCache& cache = at(request.cache);
   const CacheReader& reader = cache.reader;
   variableOf(reader, cache.name, request.scalar);
   if (request.step >= reader.series().steps.size()) throw UsageError("there is no step {}", request.step);
@@ -242,7 +272,7 @@ std::string ServedCaches::isosurfaceText(const IsosurfaceRequest& request) const
 }
 
 std::string ServedCaches::commandText(const CommandRequest& request) const {
-  const CacheReader& reader = caches_[request.cache].reader;
+  const CacheReader& reader = at(request.cache).reader;
   const uint64_t steps = reader.series().steps.size();
   if (request.step >= steps)
     throw UsageError("there is no step {}; the last one is {}", request.step, steps - 1);
@@ -264,16 +294,21 @@ std::string ServedCaches::commandText(const CommandRequest& request) const {
   return textOf({{"type", "command"}, {"cache", request.cache}, {"text", text}, {"files", files}});
 }
 
+std::string ServedCaches::refusalText(const std::string& text) {
+  return textOf({{"type", "error"}, {"text", text}});
+}
+
 std::string ServedCaches::errorText(std::string text) const {
   const auto replaceAll = [&](const std::string& from, const std::string& to) {
     for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
       text.replace(at, from.size(), to);
   };
-  for (const Served& cache : caches_)
-    for (const fs::path& path : {cache.reader.path(), cache.reader.cachePath()})
-      replaceAll(path.string(), cache.name);
+  for (const auto& cache : caches_)
+    for (const fs::path& path : {cache->reader.path(), cache->reader.cachePath()})
+      replaceAll(path.string(), cache->name);
   replaceAll("give --backend", "have the server started with --backend");  // a viewer has no options
-  return textOf({{"type", "error"}, {"text", text}});
+  replaceAll("open it again", "reload this page");
+  return refusalText(text);
 }
 
 }  // namespace curvisplat

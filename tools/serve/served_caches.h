@@ -1,31 +1,43 @@
-// The caches that a server shows: opened once, before it listens, with the view that each begins with. Pages know a
-// cache by its number and its name; where it lies on the machine leaves no function here.
+// The caches that a server shows, with the view that each begins with. Pages know a cache by its number and its name;
+// where it lies on the machine leaves no function here.
+//
+//   ServedFolders  --caches(), for each new viewer-->  ServedCaches
+//   opens a cache again whose manifest has changed     stays as it is: the viewer keeps it
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "stream/base/mutex.h"
+#include "stream/base/watched_file.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/serve/client_requests.h"
 #include "tools/view/view_state.h"
 
 namespace curvisplat {
 
+/// A cache as it was when it was opened.
+struct ServedCache {
+  std::string name;
+  CacheReader reader;
+  ViewState first;
+  std::vector<std::string> faces;
+};
+
+/// The caches that a viewer is shown. Every function with a cache's number throws UsageError if there is no such cache.
 class ServedCaches {
  public:
-  /// Throws Error as CacheReader; 0.1 to 0.3 s a cache. Requires one path or more.
-  /// `faces`: the names of a cache's faces that FrameRequest::faces_at finds; none: pages offer no faces.
-  using FacesOf = std::function<std::vector<std::string>(const CacheReader&)>;
-  explicit ServedCaches(const std::vector<std::filesystem::path>& paths, const FacesOf& faces = {});
+  using All = std::vector<std::shared_ptr<const ServedCache>>;
+  /// `reading` is held while a coarse level is read: its memory is not part of a viewer's limit. Outlives this.
+  ServedCaches(All caches, Mutex& reading) : caches_(std::move(caches)), reading_(reading) {}
 
   size_t size() const { return caches_.size(); }
-  const CacheReader& reader(size_t cache) const { return caches_[cache].reader; }
-  const std::string& name(size_t cache) const { return caches_[cache].name; }
+  const CacheReader& reader(size_t cache) const { return at(cache).reader; }
 
   /// The view of a cache before anything is chosen, for a picture of this size. Any thread.
   ViewState firstView(size_t cache, ImageSize size) const;
@@ -65,17 +77,41 @@ class ServedCaches {
 
   /// An error for a page: `text` without paths of this machine.
   std::string errorText(std::string text) const;
+  /// The same for a text without paths.
+  static std::string refusalText(const std::string& text);
 
  private:
+  const ServedCache& at(size_t cache) const;
   double aspectOf(size_t cache, ImageSize picture) const;
-  struct Served {
+
+  const All caches_;
+  Mutex& reading_;
+};
+
+/// The folders of the caches, which may get time steps and scalars, or be replaced, while they are served.
+class ServedFolders {
+ public:
+  /// The names of a cache's faces that FrameRequest::faces_at finds; none: pages offer no faces.
+  using FacesOf = std::function<std::vector<std::string>(const CacheReader&)>;
+  /// Throws Error as CacheReader; 0.1 to 0.3 s a cache. Requires one path or more.
+  explicit ServedFolders(const std::vector<std::filesystem::path>& paths, FacesOf faces = {});
+
+  /// The caches as they are now. Opens those again whose manifests have changed; one that cannot be opened stays as it
+  /// was, with a message. Any thread; must outlive what it returns.
+  std::shared_ptr<const ServedCaches> caches();
+
+ private:
+  struct Folder {
+    std::filesystem::path path;
     std::string name;
-    CacheReader reader;
-    ViewState first;
-    std::vector<std::string> faces;
+    FileState manifest;        // when it was opened
+    ServedCaches::All caches;  // the cache, and those of scalars with blanks of their own
   };
-  std::vector<Served> caches_;
-  mutable Mutex reading_;  // held while a coarse level is read: its memory is not part of a viewer's limit
+  void open(Folder& folder) const;
+
+  const FacesOf faces_;
+  Mutex opening_, reading_;
+  std::vector<Folder> folders_ GUARDED_BY(opening_);
 };
 
 }  // namespace curvisplat

@@ -79,8 +79,8 @@ class ViewerCloser {
 
 class Server : public ConnectionHost {
  public:
-  Server(const ServedCaches& caches, const ServerOptions& options, const Progress& stopped)
-      : caches_(caches),
+  Server(ServedFolders& folders, const ServerOptions& options, const Progress& stopped)
+      : folders_(folders),
         options_(options),
         stopped_(stopped),
         acceptor_(io_),
@@ -120,7 +120,6 @@ class Server : public ConnectionHost {
     stopped_.throwIfStopped();
   }
 
-  const ServedCaches& caches() const override { return caches_; }
   const ServerOptions& options() const override { return options_; }
 
   std::unique_ptr<RemoteViewer> newViewer(const std::shared_ptr<Connection>& connection) override {
@@ -128,7 +127,7 @@ class Server : public ConnectionHost {
     ++viewers_;
     std::weak_ptr<Connection> weak = connection;
     return std::make_unique<RemoteViewer>(
-        caches_, options_.each, [this, weak = std::move(weak)](std::string message, bool is_text) {
+        folders_, options_.each, [this, weak = std::move(weak)](std::string message, bool is_text) {
           asio::post(io_, [weak, is_text, text = std::move(message)]() mutable {
             if (const auto one = weak.lock()) one->send(std::move(text), is_text);
           });
@@ -186,7 +185,7 @@ class Server : public ConnectionHost {
     });
   }
 
-  const ServedCaches& caches_;
+  ServedFolders& folders_;
   const ServerOptions& options_;
   const Progress& stopped_;
   asio::io_context io_{1};
@@ -199,9 +198,9 @@ class Server : public ConnectionHost {
 
 }  // namespace
 
-void runServer(const ServedCaches& caches, const ServerOptions& options, const Progress& stopped,
+void runServer(ServedFolders& folders, const ServerOptions& options, const Progress& stopped,
                const std::function<void(const std::string& address)>& listening) {
-  Server server(caches, options, stopped);
+  Server server(folders, options, stopped);
   listening(server.address());
   server.run();
 }

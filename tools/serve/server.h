@@ -19,7 +19,7 @@ namespace curvisplat {
 
 /// Listens, calls `listening` with the page's address, and serves until `stopped` is stopped; then throws
 /// Interrupted. Throws Error if the address cannot be listened at.
-void runServer(const ServedCaches& caches, const ServerOptions& options, const Progress& stopped,
+void runServer(ServedFolders& folders, const ServerOptions& options, const Progress& stopped,
                const std::function<void(const std::string& address)>& listening);
 
 }  // namespace curvisplat

@@ -303,7 +303,10 @@ void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {
     if (surface.visible) add(shortPath(surface.path).string(), surface.colour);
   for (const NamedFaces& named : state.faces)
     if (named.visible) add(named.name, named.colour);
-  for (const std::string& colour : colours) words.add("--surface-colour", colour);
+  // Given once, or once for each surface; faces that show a scalar need none.
+  const bool has_files = std::ranges::any_of(state.surfaces, &SurfaceFile::visible);
+  if (!state.faces_by || has_files)
+    for (const std::string& colour : colours) words.add("--surface-colour", colour);
   addSurfaceOpacities(state, words);
   if (state.faces_by && !state.faceNames().faces.empty()) words.add("--surface-by", state.faces_by->variable);
   if (!state.hasSheets()) return;

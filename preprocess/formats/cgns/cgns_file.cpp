@@ -284,7 +284,7 @@ void CgnsFile::checkLink(double id, const std::string& node_path) const {
   std::string file(static_cast<size_t>(file_length) + 1, '\0');
   std::string path(static_cast<size_t>(path_length) + 1, '\0');
   if (cgio_get_link(file_, id, file.data(), path.data()) == CGIO_ERR_NONE)
-    namedFile(path_.string() + ": " + node_path, folderOf(path_), file.c_str());
+    noteLinks(path_, {namedFile(path_.string() + ": " + node_path, folderOf(path_), file.c_str())});
 }
 
 CgnsShape CgnsFile::storedShape(const OpenNode& open, const CgnsNode& node) const {

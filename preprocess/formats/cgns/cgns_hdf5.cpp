@@ -30,11 +30,12 @@ std::string placeOf(const std::string& node_path) {
 
 }  // namespace
 
-CgnsHdf5::CgnsHdf5(std::filesystem::path path) : path_(std::move(path)), watched_(path_) {
+CgnsHdf5::CgnsHdf5(std::filesystem::path path) : path_(std::move(path)) {
   tryHdf5(path_, [this] {
     size_t most = kTriedNodes;
     CgnsHdf5(path_).visitAll({}, 0, most);
   });
+  watched_ = WatchedFiles({path_.string()});
   const QuietHdf5 quiet;
   Hdf5File file(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   if (!file) unreadable("", "the file");

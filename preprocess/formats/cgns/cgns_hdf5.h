@@ -74,7 +74,7 @@ class CgnsHdf5 {
   void readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, void* to) const;
 
   std::filesystem::path path_;
-  WatchedFile watched_;
+  WatchedFiles watched_;  // with those that links lead to
   Hdf5File file_;
   // Guarded by dataLibraryMutex().
   mutable std::set<std::string> files_;  // those whose nodes were listed

@@ -82,7 +82,7 @@ void Hdf5Sets::with(const std::filesystem::path& path, const std::string& name,
 }
 
 Hdf5Array::Hdf5Array(std::shared_ptr<Hdf5Sets> sets, std::filesystem::path path, std::string name)
-    : sets_(std::move(sets)), path_(std::move(path)), watched_(path_), name_(std::move(name)) {
+    : sets_(std::move(sets)), path_(std::move(path)), name_(std::move(name)) {
   sets_->with(path_, name_, [&](hid_t set) {
     const Hdf5Type type(H5Dget_type(set));
     kind_ = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
@@ -95,6 +95,7 @@ Hdf5Array::Hdf5Array(std::shared_ptr<Hdf5Sets> sets, std::filesystem::path path,
     for (const uint64_t n : dims_)
       size_ = n > 0 && size_ > kMaxArrayValues / n ? kMaxArrayValues + 1 : size_ * n;
     if (dims_.empty()) fail("has no dimensions; expected an array");
+    watched_ = WatchedFiles({path_.string()});
     if (size_ > kMaxArrayValues) fail("has impossible dimensions; the file is damaged");
     stored_bytes_ = isVirtual(set) ? std::numeric_limits<uint64_t>::max() : H5Dget_storage_size(set);
   });

@@ -91,7 +91,7 @@ class Hdf5Array {
 
   std::shared_ptr<Hdf5Sets> sets_;
   std::filesystem::path path_;
-  WatchedFile watched_;
+  WatchedFiles watched_;  // with those that links lead to
   std::string name_;
   std::vector<uint64_t> dims_;
   uint64_t size_ = 1;

@@ -25,6 +25,7 @@
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "stream/base/error.h"
 #include "stream/base/os.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 namespace {
@@ -462,6 +463,7 @@ void walkAll(const std::filesystem::path& path, TriedFiles& walked) {
     if (trial != Trial::kNone) tried.push_back(before);
     if (trial == Trial::kPassed) continue;
     const Hdf5Exits exits(file);
+    noteLinks(file, exits.files());
     sources.insert(sources.end(), exits.sources().begin(), exits.sources().end());
     for (const auto& next : exits.files())
       if (known.insert(next).second) files.push_back(next);

@@ -47,7 +47,7 @@ bool NetcdfFile::recognises(const InputFile& file) {
   return mark.size() == 8 && (isClassic(mark) || mark == "\x89HDF\r\n\x1a\n");
 }
 
-NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path), watched_(path) {
+NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   const InputFile file(path);
   const uint64_t bytes = file.size();
   std::array<char, 4> begin{};
@@ -59,6 +59,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path), watched
     tryHdf5(path, [&] { const NetcdfFile again(path); });
     plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
   }
+  watched_ = WatchedFiles({path_.string()});
   const QuietHdf5 quiet;
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.
@@ -104,7 +105,7 @@ void NetcdfFile::emptyCaches() const {
 
 int NetcdfFile::opened() const {
   if (file_ >= 0) return file_;
-  if (!watched_.isSame()) watched_.failAsChanged();
+  watched_.requireSame();
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   if (const int status = nc_open(std::filesystem::absolute(path_).c_str(), NC_NOWRITE, &file_);
       status != NC_NOERR) {

@@ -77,7 +77,7 @@ class NetcdfFile {
 
  protected:
   struct NotOpened {};
-  NetcdfFile(const std::filesystem::path& path, NotOpened) : path_(path), watched_(path) {}
+  NetcdfFile(const std::filesystem::path& path, NotOpened) : path_(path) {}
   void addVariable(NetcdfVariable variable);
 
   std::filesystem::path path_;
@@ -106,7 +106,7 @@ class NetcdfFile {
                 std::span<Value> to) const;
 
   mutable int file_ = -1;  // -1: released
-  WatchedFile watched_;
+  WatchedFiles watched_;   // with those that links lead to
   bool plain_hdf5_ = false;
   std::optional<uint64_t> records_;  // of a classic file
   std::vector<NetcdfVariable> variables_;

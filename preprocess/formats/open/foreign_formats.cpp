@@ -425,6 +425,23 @@ std::optional<std::string> foreignHdf5(const std::filesystem::path& path) {
   return std::nullopt;
 }
 
+namespace {
+
+/// The format that the ending of a name promises, of formats whose files begin with a mark; null for others.
+const char* formatOfEnding(const std::filesystem::path& path) {
+  constexpr std::pair<std::string_view, const char*> kEndings[] = {
+      {".vtk", "a legacy VTK file"}, {".vti", "a VTK XML file"},   {".vtr", "a VTK XML file"},
+      {".vts", "a VTK XML file"},    {".vtu", "a VTK XML file"},   {".vtm", "a VTK XML file"},
+      {".vtp", "a VTK XML file"},    {".pvd", "a VTK XML file"},   {".nc", "a NetCDF file"},
+      {".cgns", "a CGNS file"},      {".case", "an EnSight case"}, {".xdmf", "an XDMF file"},
+      {".xmf", "an XDMF file"}};
+  const std::string ending = lowerCase(path.extension().string());
+  const auto found = std::ranges::find(kEndings, ending, &std::pair<std::string_view, const char*>::first);
+  return found == std::end(kEndings) ? nullptr : found->second;
+}
+
+}  // namespace
+
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   if (isRegularFile(path / "manifest.json") && isRegularFile(path / "bricks.bin"))
     throw Error(
@@ -438,6 +455,11 @@ void refuseForeign(const std::filesystem::path& path, const char* expected) {
     throw Error("{}: is a directory; expected {}", path.string(), expected);
   if (const auto format = foreignFormat(InputFile(path)))
     throw Error("{}: is {}; expected {}", path.string(), *format, expected);
+  if (const char* const format = formatOfEnding(path))
+    throw Error(
+        "{}: does not begin as {} does; write or copy it again, or change its ending if it has another "
+        "format",
+        path.string(), format);
 }
 
 }  // namespace curvisplat

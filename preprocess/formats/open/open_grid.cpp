@@ -195,8 +195,13 @@ std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
                     options.solutions.front().string());
       }
     // The empty file that stands for a case of OpenFOAM, which has no mesh.
-    if (options.grid.extension() == ".foam" || options.grid.extension() == ".OpenFOAM")
-      refuseForeign(folderOf(options.grid), "a grid file");
+    if (options.grid.extension() == ".foam" || options.grid.extension() == ".OpenFOAM") {
+      if (const auto found = foreignFolder(folderOf(options.grid)))
+        throw Error("{}: is in {}", options.grid.string(), *found);
+      throw Error(
+          "{}: stands for an OpenFOAM case, but its folder has none (expected constant/polyMesh there)",
+          options.grid.string());
+    }
     if (file.size() == 0) throw Error("{}: is empty; expected a grid file", options.grid.string());
   }
   refuseForeign(options.grid, "a grid file");

@@ -179,8 +179,9 @@ std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelecti
   for (uint64_t step = selection.first; step < end; step += std::min(selection.stride, count))
     numbers.push_back(step);
   if (numbers.empty())
-    throw UsageError("{}: step {} is out of range; there are {} steps, from 0 to {}", option, selection.first,
-                     count, count - 1);
+    throw UsageError("{}: step {} is out of range; {}", option, selection.first,
+                     count == 1 ? "there is one, step 0"
+                                : fmt::format("there are {} steps, from 0 to {}", count, count - 1));
   return numbers;
 }
 
