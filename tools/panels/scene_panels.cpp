@@ -405,9 +405,9 @@ void SurfacePanel::chooseScalarOf(size_t number, const Isosurface& one, const Fu
     const bool chooses =
         ImGui::Selectable(scalarTitle(info.name, info.unit).c_str(), info.name == one.scalar);
     nameWidget(fmt::format("{} by {}", name, info.name));
-    if (chooses && info.name != one.scalar) actions.isosurface_scalar = {number, info.name};
+    if (chooses && info.name != one.scalar) actions.isosurface_scalar = {one.id, info.name};
   }
-  if (further) drawFurther(*further, {"", false, number}, name + " by further ", actions);
+  if (further) drawFurther(*further, {"", false, one.id}, name + " by further ", actions);
   ImGui::EndCombo();
 }
 

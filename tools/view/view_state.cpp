@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -290,6 +291,11 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
 }
 
 }  // namespace
+
+uint64_t nextIsosurfaceId() {
+  static std::atomic<uint64_t> last = 0;
+  return ++last;
+}
 
 std::vector<std::vector<Isosurface>> ViewState::drawnIsosurfaces() const {
   std::vector<std::vector<Isosurface>> drawn;

@@ -134,7 +134,7 @@ class CacheView {
   void readSurface(const std::filesystem::path& file);
   void takeSurface();
   void colourFaces(const std::string& scalar);
-  void findIsosurface(const std::string& scalar, std::optional<size_t> replaced = {});
+  void findIsosurface(const std::string& scalar, std::optional<uint64_t> replaced = {});
   void takeIsosurfaces();
   void saveMovieTo(const std::filesystem::path& file, ImageSize size,
                    std::optional<double> frames_per_s = {});
@@ -261,8 +261,7 @@ class CacheView {
   std::future<SurfaceFile> reading_surface_;  // that is to be added
   struct FoundIsosurface {
     Isosurface surface;
-    std::optional<size_t> replaced;  // its place in the list; none: it is added
-    Isosurface before;               // what was there then
+    std::optional<uint64_t> replaced;  // the id of the one that takes scalar and value; none: it is added
   };
   std::deque<std::future<FoundIsosurface>> finding_isosurfaces_;
   uint64_t values_asked_for_ = 0;  // request
