@@ -175,7 +175,7 @@ void CacheView::saveMovieOf(MovieKind kind) {
   dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ending, std::move(offer));
 }
 
-/// Looks as at the beginning, before anything was turned, in this window or in one before it.
+/// Looks as at the beginning, before anything was turned, in this window or in one before it, and flies no more.
 void CacheView::lookAsAtFirst() {
   constexpr double kAsWide = 0.97;  // bars with text of the panels' size are a little wider or narrower
   const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
@@ -185,6 +185,7 @@ void CacheView::lookAsAtFirst() {
     state_.camera =
         refitted(state_.camera, state_.scale * manifest().lower, state_.scale * manifest().upper, data_size_);
   fitted_width_ = data_size_.width;
+  navigation_.endFlight();
   film_.stop();
   changed_ = true;
 }
