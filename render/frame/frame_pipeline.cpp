@@ -100,7 +100,7 @@ FramePipeline::~FramePipeline() {
 FrameBudget FramePipeline::budgetOf(const FrameOptions& options, bool two_scalars) const {
   const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
   const FrameBudget::Fixed fixed{
-      planner_.bytes(),
+      planner_.bytes(options),
       least_pager_bytes_,
       backend_->bytes(options.size,
                       {.threads = options.threads, .waiting_splats = FrameBudget::kMinWaitingSplats}) +

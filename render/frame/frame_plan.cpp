@@ -96,10 +96,13 @@ FramePlanner::FramePlanner(const CacheReader& cache, const DrawnScalars& scalars
   if (colour_classes_) colour_change_.emplace(*colour_classes_);
 }
 
-uint64_t FramePlanner::bytes() const {
+uint64_t FramePlanner::bytes(const FrameOptions& options) const {
+  // Isosurfaces of further scalars are planned one scalar after the other.
+  const bool has_third = options.scene && !options.scene->further_isosurfaces.empty();
+  const uint64_t bounds = 1 + (coloured_by_ ? 1 : 0) + (has_third ? 1 : 0);
   return cache_.bricks().size() *
          (sizeof(Brick) + cache_.manifest().variables.size() * sizeof(BrickVariable) +
-          (coloured_by_ ? 2 : 1) * sizeof(ValueBounds) + kFrameBytesABrick);
+          bounds * sizeof(ValueBounds) + kFrameBytesABrick);
 }
 
 uint64_t FramePlanner::mostSplats() const {

@@ -115,8 +115,8 @@ class FramePlanner {
   const ColourTable& colours() const { return colours_; }
   /// The function of the opacities.
   const TransferFunction& transferFunction() const { return transfer_function_; }
-  /// Memory in bytes of the octree, and of what plans and the later stages note about its bricks.
-  uint64_t bytes() const;
+  /// Memory in bytes of the octree, and of what plans of such frames and the later stages note about its bricks.
+  uint64_t bytes(const FrameOptions& options) const;
   /// The most splats that any picture can have: those of the cache's finest level, with their border parts.
   uint64_t mostSplats() const;
 

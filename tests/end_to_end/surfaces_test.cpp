@@ -195,15 +195,15 @@ TEST_F(SurfaceOptions, WarningsOfSurfacesAloneDoNotMentionTheVolume) {
   EXPECT_EQ(wall.err.find("warning"), std::string::npos) << wall.err;
   const ProgramResult nothing =
       runProgram(render({"--volume", "off", "--surface", file("sphere.obj"), "--focal-point", "900,0,0"}));
-  expectSays(nothing.err, "no surface, slice or isosurface is in sight");
+  expectSays(nothing.err, "no surface, slice, line or isosurface is in sight");
   EXPECT_EQ(nothing.err.find("transfer function"), std::string::npos) << nothing.err;
 }
 
 TEST_F(SurfaceOptions, SaysWhyNoIsosurfaceIsSeen) {
   const ProgramResult nothing =
       runProgram(render({"--volume", "off", "--iso", "0.5", "--focal-point", "900,0,0"}));
-  expectSays(nothing.err, "no isosurface of 0.5 is in sight");
-  expectSays(nothing.err, "f goes from 0 to 0.995661");
+  expectSays(nothing.err, "no isosurface is in sight");
+  expectSays(nothing.err, "asked for 0.5 of f, which goes from 0 to 0.995661.");
 }
 
 /// A helix and a straight line, with the height and a number of the line as scalars, in every format.

@@ -459,6 +459,11 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
   const Image of_colours = with({"--iso-by", "s1", "--iso", "0.6"});
   EXPECT_LT(db(with({"--iso", "0.6"}), of_colours), 40);
   EXPECT_LT(db(with({"--iso-by", "s1", "--iso", "0.6", "--iso-opacity", "function"}), of_colours), 40);
+  // Each value is reported with its scalar; that of --opacity-by is the one of values without a name.
+  const ProgramResult unseen = runProgram(
+      render(two + Words{"--iso", "0.5", "--iso", "s1=0.6", "--volume", "off", "--focal-point", "900,0,0"}));
+  expectSays(unseen.err, "asked for 0.5 of s0, which goes from ");
+  expectSays(unseen.err, "; 0.6 of s1, which goes from ");
   const struct {
     Words options;
     int status;
@@ -473,6 +478,7 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
        2,
        ": --opacity-asinh 1,0: expected a WIDTH above zero"},
       {{"--iso-by", "s1"}, 2, "--iso-by s1: needs an isosurface: --iso VALUE"},
+      {{"--iso-by", "s1", "--iso", "s0=0.5"}, 2, "--iso-by s1: each --iso names its own scalar; leave one"},
       {{"--iso", "=0.5"}, 2, "--iso =0.5: no scalar before the '='; expected NAME=VALUE"},
       {{"--iso", "s0=0.5,s1=0.5"},
        2,

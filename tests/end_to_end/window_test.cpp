@@ -206,6 +206,29 @@ TEST_F(WindowsCamera, TheFirstViewComesBack) {
   close();
 }
 
+/// A drag turns the data again, as it did before the flight. It goes across, since a slanting drag depends on its steps.
+TEST_F(WindowsCamera, TheFirstViewEndsFlight) {
+  for (const Words& options : {Words{}, Words{"--view", "+x"}}) {  // in perspective, and orthographic
+    open(options);
+    saveAndCopy();
+    dragPicture(1, 0.2, 0);
+    saveAndCopy();
+    press("f");
+    press("shift+r");
+    saveAndCopy();
+    dragPicture(1, 0.2, 0);
+    saveAndCopy();
+    const std::vector<SeenFrom> seen = closeAndSee();
+    ASSERT_EQ(seen.size(), 4u);
+    EXPECT_GT(glm::length(seen[1].position - seen[0].position), 0.5);
+    for (const size_t n : {0u, 1u}) {
+      EXPECT_LE(glm::length(seen[n + 2].position - seen[n].position), kRounded) << n;
+      EXPECT_LE(glm::length(seen[n + 2].focal_point - seen[n].focal_point), kRounded) << n;
+      EXPECT_EQ(seen[n + 2].view_angle, seen[n].view_angle);
+    }
+  }
+}
+
 TEST_F(WindowsCamera, ArrowsTurnTheCameraAsTheOptionsDo) {
   open();
   press("z");

@@ -255,6 +255,19 @@ class FrameRegionsTest : public testing::Test {
 std::unique_ptr<TemporaryFolder> FrameRegionsTest::folder_;
 std::unique_ptr<CacheReader> FrameRegionsTest::cache_;
 
+/// The bounds of a scalar that only isosurfaces are of, four floats a brick, are part of --memory.
+TEST_F(FrameRegionsTest, MemoryCountsTheFurtherScalarsOfIsosurfaces) {
+  const FramePlanner planner(*cache_, DrawnScalars(0, TransferFunction::preset("cool-warm", 0, 1, 1)));
+  FrameOptions options;
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->isovalues = {0.5};
+  options.scene = scene;
+  const uint64_t own = planner.bytes(options);
+  EXPECT_EQ(own, planner.bytes({}));
+  scene->further_isosurfaces = {{1, {0.5}}, {2, {0.5}}};  // planned one after the other
+  EXPECT_EQ(planner.bytes(options) - own, 16 * cache_->bricks().size());
+}
+
 TEST_F(FrameRegionsTest, ThereIsOneWhereALayerFits) {
   const FramePlan whole = plan({400, 300});
   for (const size_t splats : {size_t{2} * whole.cut.splats, size_t{whole.cut.splats}}) {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "stream/base/error.h"
 #include "tests/support/expect_error.h"
@@ -388,6 +389,26 @@ TEST(ViewState, OfAnEarlierVersionHasIsosurfacesOfItsOpacities) {
   ASSERT_EQ(state.isosurfaces.size(), 2u);
   EXPECT_EQ(state.isosurfaces[1].scalar, "density");
   EXPECT_EQ(state.isosurfaces[1].value, 1);
+}
+
+/// Programs that drew the isosurfaces of one scalar listed the others as visible, too.
+TEST(ViewState, OfAnEarlierVersionShowsTheIsosurfacesItDrew) {
+  ViewState state = firstViewOf(manifest(), {300, 200});  // of density
+  state.isosurfaces = {{"density", 0.75}, {"u v", 0.5}, {"density", 1, false}};
+  const auto shown = [](const nlohmann::json& json) {
+    std::vector<bool> visible;
+    for (const Isosurface& one : viewStateFromJson(json.dump(), "a.json", manifest()).isosurfaces)
+      visible.push_back(one.visible);
+    return visible;
+  };
+  auto json = nlohmann::json::parse(toJson(state));
+  EXPECT_EQ(shown(json), (std::vector<bool>{true, true, false}));
+  json.erase("isosurfaces_of_all_scalars");
+  json["isovalues"] = {0.75};
+  EXPECT_EQ(shown(json), (std::vector<bool>{true, false, false}));
+  json["isovalues"] = {0.5};  // without the volume, and density's own hidden, it drew the other scalar's
+  json["isosurfaces"][0]["visible"] = false;
+  EXPECT_EQ(shown(json), (std::vector<bool>{false, true, false}));
 }
 
 TEST(RenderCommand, HasEveryOption) {

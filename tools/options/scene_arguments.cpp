@@ -288,6 +288,10 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
   parseIsovalues(arguments);
   if (!arguments.iso_by.empty() && arguments.isovalues.empty())
     throw UsageError("--iso-by {}: needs an isosurface: --iso VALUE", arguments.iso_by);
+  const auto has_name = [](const std::string& text) { return text.find('=') != std::string::npos; };
+  if (!arguments.iso_by.empty() && std::ranges::all_of(arguments.isovalues, has_name))
+    throw UsageError("--iso-by {}: each --iso names its own scalar; leave one of the two out",
+                     arguments.iso_by);
   parseIsoColours(arguments);
   const SheetOpacity of_isosurfaces = parseSheetOpacity("--iso-opacity", arguments.iso_opacity);
   if (!of_isosurfaces.opaque() && arguments.isovalues.empty())

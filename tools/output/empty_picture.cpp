@@ -134,23 +134,31 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
 }
 
 /// Why nothing is seen of a scene without the volume.
-std::string whyNoSheetIsVisible(const SurfaceScene& sheets, const VariableInfo& variable) {
+std::string whyNoSheetIsVisible(const SurfaceScene& sheets, const RenderedScene& scene) {
   const bool is_only_iso = sheets.surfaces.empty() && sheets.grid_surfaces.empty() && sheets.slices.empty() &&
-                           sheets.further_isosurfaces.empty() && !sheets.isovalues.empty();
+                           sheets.curves.empty() && sheets.hasIsosurfaces();
   if (!is_only_iso)
-    return "no surface, slice or isosurface is in sight, and --volume is off; try --view iso or another "
-           "camera";
+    return "no surface, slice, line or isosurface is in sight, and --volume is off; try --view iso or "
+           "another camera";
+  std::vector<std::string> asked;
+  const auto ask = [&](const std::vector<double>& values, const VariableInfo& of) {
+    if (!values.empty())
+      asked.push_back(fmt::format("{:g} of {}, which goes from {:g} to {:g}", fmt::join(values, ", "),
+                                  of.name, of.min, of.max));
+  };
+  ask(sheets.isovalues, scene.variable);
+  for (const FurtherIsosurfaces& further : sheets.further_isosurfaces)
+    ask(further.values, scene.manifest.variables[further.variable]);
   return fmt::format(
-      "no isosurface of {:g} is in sight, and --volume is off; {} goes from {:g} to {:g}, of which a cache "
-      "has the means over cells, "
-      "which are less far apart: try a value between, --view iso, or convert again with --refine 2",
-      fmt::join(sheets.isovalues, ", "), variable.name, variable.min, variable.max);
+      "no isosurface is in sight, and --volume is off; asked for {}. A cache has the means over cells, which "
+      "are less far apart: try a value between, --view iso, or convert again with --refine 2",
+      fmt::join(asked, "; "));
 }
 
 std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   std::vector<std::string> reasons;
   if (scene.options.scene && !scene.options.scene->volume)
-    return {whyNoSheetIsVisible(*scene.options.scene, scene.variable)};
+    return {whyNoSheetIsVisible(*scene.options.scene, scene)};
   const double largest = largestExtinction(scene.transfer_function, scene.variable.min, scene.variable.max);
   if (largest == 0) reasons.push_back(whyTransparent(scene));
 

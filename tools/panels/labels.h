@@ -35,7 +35,7 @@ struct PanelActions {
   std::optional<std::string> scalar, opacity_scalar;  // to show; the empty name: opacities of the same scalar
   std::optional<std::string> add_faces;               // of the grid, by name
   std::string pointed_faces;                          // that the mouse points at in a list; empty: none
-  std::optional<std::pair<size_t, std::string>> isosurface_scalar;  // of the n-th one
+  std::optional<std::pair<uint64_t, std::string>> isosurface_scalar;  // of the one with this id
   std::optional<std::string> colour_faces;  // by a scalar; the empty name: each has its own colour
   bool automatic_function = false;          // colours and opacities chosen from the data
   bool automatic_opacities = false;  // range and opacities alone, of the scalar that gives the opacities

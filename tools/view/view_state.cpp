@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -169,6 +170,7 @@ void putSurfaces(Json& json, const ViewState& state) {
         {{"scalar", one.scalar}, {"value", one.value}, {"visible", one.visible}, {"colour", nullptr}});
     if (one.colour) json["isosurfaces"].back()["colour"] = jsonOf(glm::dvec3(*one.colour));
   }
+  json["isosurfaces_of_all_scalars"] = true;
   json["iso_opacity"] = state.iso_opacity.factor;
   json["isosurfaces_by_function"] = state.iso_opacity.by_function;
   json["volume"] = state.volume;
@@ -241,6 +243,16 @@ void hideOthers(std::vector<Isosurface>& isosurfaces, const Manifest& manifest) 
   for (Isosurface& one : isosurfaces) one.visible &= manifest.variable(one.scalar) != nullptr;
 }
 
+/// Hides isosurfaces that the program which wrote a state did not draw: earlier versions drew those of one scalar, whose values
+/// they list in "isovalues".
+void hideUndrawn(const JsonField& fields, std::vector<Isosurface>& isosurfaces) {
+  const auto drawn = fields.find("isovalues");
+  if (!drawn || fields.has("isosurfaces_of_all_scalars")) return;
+  std::vector<double> values;
+  for (const JsonField& value : drawn->elements(kMaxIsovalues)) values.push_back(value.number(-1e300, 1e300));
+  for (Isosurface& one : isosurfaces) one.visible &= std::ranges::find(values, one.value) != values.end();
+}
+
 /// States of earlier versions lack some.
 void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, const Manifest& manifest,
                   ViewState& state) {
@@ -273,6 +285,7 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
           {one.at("scalar").text(), one.at("value").number(-1e300, 1e300), visibleFrom(one)});
       if (const auto colour = one.find("colour")) state.isosurfaces.back().colour = colourFrom(*colour);
     }
+    hideUndrawn(fields, state.isosurfaces);
   } else if (const auto values = fields.find("isovalues")) {  // earlier versions had those of one scalar
     for (const JsonField& value : values->elements(kMaxIsovalues))
       state.isosurfaces.push_back({state.opacityScalar(), value.number(-1e300, 1e300)});
@@ -284,6 +297,11 @@ void takeSurfaces(const JsonField& fields, const std::filesystem::path& path, co
 }
 
 }  // namespace
+
+uint64_t nextIsosurfaceId() {
+  static std::atomic<uint64_t> last = 0;
+  return ++last;
+}
 
 std::vector<std::vector<Isosurface>> ViewState::drawnIsosurfaces() const {
   std::vector<std::vector<Isosurface>> drawn;

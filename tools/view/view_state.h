@@ -49,11 +49,15 @@ struct ListedPlane : ClipPlane {
   bool visible = true;
 };
 
+/// A number that no other call of this process returns.
+uint64_t nextIsosurfaceId();
+
 struct Isosurface {
   std::string scalar;
   double value = 0;
   bool visible = true;
   std::optional<glm::vec3> colour = std::nullopt;  // none: the function's
+  uint64_t id = nextIsosurfaceId();  // copies have it, too: the list may change meanwhile; never saved
 };
 
 /// The scalar that colours the grid's faces, and the function that gives them colours where the picture

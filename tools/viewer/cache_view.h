@@ -78,7 +78,7 @@ class CacheView {
   void showScalar(const std::string& name);
   /// An empty name: the opacities are of the same scalar.
   void chooseOpacityScalar(const std::string& name);
-  /// Takes a scalar that was added for the opacities or an isosurface; says if the cache that is shown does not have it.
+  /// Takes a scalar that was added for the opacities, faces or an isosurface; says if the cache that is shown does not have it.
   void useScalar(const WantedScalar& wanted);
   void use(const FileDialog::Chosen& chosen);
   void addTo(MenuFacts& facts);
@@ -134,7 +134,7 @@ class CacheView {
   void readSurface(const std::filesystem::path& file);
   void takeSurface();
   void colourFaces(const std::string& scalar);
-  void findIsosurface(const std::string& scalar, std::optional<size_t> replaced = {});
+  void findIsosurface(const std::string& scalar, std::optional<uint64_t> replaced = {});
   void takeIsosurfaces();
   void saveMovieTo(const std::filesystem::path& file, ImageSize size,
                    std::optional<double> frames_per_s = {});
@@ -261,8 +261,7 @@ class CacheView {
   std::future<SurfaceFile> reading_surface_;  // that is to be added
   struct FoundIsosurface {
     Isosurface surface;
-    std::optional<size_t> replaced;  // its place in the list; none: it is added
-    Isosurface before;               // what was there then
+    std::optional<uint64_t> replaced;  // the id of the one that takes scalar and value; none: it is added
   };
   std::deque<std::future<FoundIsosurface>> finding_isosurfaces_;
   uint64_t values_asked_for_ = 0;  // request

@@ -135,13 +135,12 @@ void CacheView::addPlaneTo(std::vector<ListedPlane>& planes) {
 }
 
 /// Finds a value of a scalar whose isosurface lies in what is seen, on another thread: it reads the histogram.
-void CacheView::findIsosurface(const std::string& scalar, std::optional<size_t> replaced) {
+void CacheView::findIsosurface(const std::string& scalar, std::optional<uint64_t> replaced) {
   finding_isosurfaces_.push_back(std::async(
-      std::launch::async, [cache = cache_.at(playback_.position()), state = state_, scalar, replaced,
-                           before = replaced ? state_.isosurfaces.at(*replaced) : Isosurface{}] {
+      std::launch::async, [cache = cache_.at(playback_.position()), state = state_, scalar, replaced] {
         nameThisThread("isosurface");
         const WakeAtEnd at_the_end;
-        return FoundIsosurface{{scalar, firstIsovalue(cache, state, scalar)}, replaced, before};
+        return FoundIsosurface{{scalar, firstIsovalue(cache, state, scalar)}, replaced};
       }));
 }
 
@@ -151,14 +150,15 @@ void CacheView::takeIsosurfaces() {
     return;
   std::future<FoundIsosurface> done = std::move(finding_isosurfaces_.front());
   finding_isosurfaces_.pop_front();
-  const auto [surface, replaced, before] = done.get();
+  const auto [surface, replaced] = done.get();
   std::vector<Isosurface>& list = state_.isosurfaces;
   if (!replaced) {
     list.push_back(surface);
-  } else if (*replaced < list.size() && list[*replaced].scalar == before.scalar &&
-             list[*replaced].value == before.value) {
-    list[*replaced].scalar = surface.scalar;
-    list[*replaced].value = surface.value;
+  } else {
+    const auto found = std::ranges::find(list, *replaced, &Isosurface::id);
+    if (found == list.end()) return;  // it was removed meanwhile
+    found->scalar = surface.scalar;
+    found->value = surface.value;
   }
   changed_ = true;
 }
@@ -175,7 +175,7 @@ void CacheView::saveMovieOf(MovieKind kind) {
   dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ending, std::move(offer));
 }
 
-/// Looks as at the beginning, before anything was turned, in this window or in one before it.
+/// Looks as at the beginning, before anything was turned, in this window or in one before it, and flies no more.
 void CacheView::lookAsAtFirst() {
   constexpr double kAsWide = 0.97;  // bars with text of the panels' size are a little wider or narrower
   const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
@@ -185,6 +185,7 @@ void CacheView::lookAsAtFirst() {
     state_.camera =
         refitted(state_.camera, state_.scale * manifest().lower, state_.scale * manifest().upper, data_size_);
   fitted_width_ = data_size_.width;
+  navigation_.endFlight();
   film_.stop();
   changed_ = true;
 }

@@ -472,8 +472,8 @@ void CacheView::useScalar(const WantedScalar& wanted) {
     return say(
         fmt::format("{} has values at other samples: it is drawn by itself, as the scalar.", wanted.name));
   if (wanted.for_opacities) return chooseOpacityScalar(wanted.name);
-  const size_t number = wanted.isosurface.value_or(state_.isosurfaces.size());
-  if (number < state_.isosurfaces.size()) findIsosurface(wanted.name, number);
+  if (wanted.for_faces) return colourFaces(wanted.name);
+  findIsosurface(wanted.name, wanted.isosurface);
 }
 
 void CacheView::addFaces(const std::string& name) {

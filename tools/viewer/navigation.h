@@ -60,6 +60,8 @@ class Navigation {
   /// Whether the camera moves or moved less than 0.2 s ago, so that a coarse picture suffices.
   bool isMoving() const;
   bool flies() const { return flies_; }
+  /// The left drag rotates again.
+  void endFlight() { flies_ = false; }
 
  private:
   bool drag(Window& window, Camera& camera, ImageSize size);

@@ -92,8 +92,8 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   if (options.given && options.given->above)
     state.camera =
         cameraAbove(*options.given->above, state.scale, dataSizeOf(state, cache.manifest(), picture));
-  const Camera first_camera = state.camera;
-  const ImageSize first_size = dataSizeOf(state, cache.manifest(), picture);
+  Camera first_camera = state.camera;
+  ImageSize first_size = dataSizeOf(state, cache.manifest(), picture);
   const std::string scalar = state.variable;
   const EditedFunction automatic = state.function;
   const fs::path& whole = options.preview ? options.preview->whole : cache.cachePath();
@@ -113,8 +113,10 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   if (options.scene) takeScene(options, cache, state);
   loadSurfaces(state);
   removeMissingFaces(options.faces, cache, state);
-  if (options.camera)
-    state.camera = options.camera(cache, state, dataSizeOf(state, cache.manifest(), picture));
+  if (options.camera) {
+    first_size = dataSizeOf(state, cache.manifest(), picture);
+    first_camera = state.camera = options.camera(cache, state, first_size);
+  }
   std::vector<std::string> faces;
   if (options.faces.names) faces = options.faces.names(cache);
   std::vector<std::string> elsewhere = scalarsElsewhere(cache);
