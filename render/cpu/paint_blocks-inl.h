@@ -205,23 +205,75 @@ HWY_INLINE bool isSaturated(V transmittance) {
   return hn::AllTrue(Floats(), hn::Lt(transmittance, hn::Set(Floats(), kSaturated)));
 }
 
-/// One block. Whether it is saturated now.
-template <bool kFitted>
-HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HWY_RESTRICT footprint,
-                           float* HWY_RESTRICT block, Corner corner) {
-  const Floats d;
-  V most = hn::Zero(d);
-  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, corner, lane);
-    if (pixels.areOutside()) {
-      most = hn::Max(most, hn::Load(d, block + 3 * kBlockPixels + lane));
-      continue;
+/// The colours and transmittances of a block, in registers.
+class BlockColours {
+ public:
+  static constexpr size_t kVectors = kBlockPixels / hn::MaxLanes(Floats());
+
+  HWY_INLINE explicit BlockColours(const float* HWY_RESTRICT block) { load(block); }
+  HWY_INLINE void load(const float* HWY_RESTRICT block) {
+    const Floats d;
+    for (size_t v = 0; v < kVectors; ++v) {
+      for (int c = 0; c < 3; ++c) colour_[v][c] = hn::Load(d, block + c * kBlockPixels + v * hn::Lanes(d));
+      through_[v] = hn::Load(d, block + 3 * kBlockPixels + v * hn::Lanes(d));
     }
-    V value[4];
-    shade.valuesAt<kFitted>(pixels, value);
-    most = hn::Max(most, blendUnder(block + lane, depthAt(e, footprint, pixels), value));
   }
-  return isSaturated(most);
+  HWY_INLINE void store(float* HWY_RESTRICT block) const {
+    const Floats d;
+    for (size_t v = 0; v < kVectors; ++v) {
+      for (int c = 0; c < 3; ++c) hn::Store(colour_[v][c], d, block + c * kBlockPixels + v * hn::Lanes(d));
+      hn::Store(through_[v], d, block + 3 * kBlockPixels + v * hn::Lanes(d));
+    }
+  }
+  /// Blends vector v under what there is.
+  HWY_INLINE void blendUnder(size_t v, V depth, const V (&value)[4]) {
+    blend(depth, value, colour_[v], through_[v]);
+  }
+  HWY_INLINE bool areSaturated() const {
+    V most = through_[0];
+    for (size_t v = 1; v < kVectors; ++v) most = hn::Max(most, through_[v]);
+    return isSaturated(most);
+  }
+
+ private:
+  V colour_[kVectors][3], through_[kVectors];
+};
+
+/// Blends a splat over a block: values_at(pixels, out).
+template <typename ValuesAt>
+HWY_INLINE void blendOver(const Ellipse& e, const float* HWY_RESTRICT footprint, Corner corner,
+                          const ValuesAt& values_at, BlockColours& colours) {
+  for (size_t v = 0; v < BlockColours::kVectors; ++v) {
+    const Pixels pixels = pixelsAt(e, corner, v * hn::Lanes(Floats()));
+    if (pixels.areOutside()) continue;
+    const V depth = depthAt(e, footprint, pixels);
+    V value[4];
+    values_at(pixels, value);
+    colours.blendUnder(v, depth, value);
+  }
+}
+
+/// Blends a splat of one parabola, or one colour, over a block.
+HWY_INLINE void blendOver(const Ellipse& e, const float* HWY_RESTRICT footprint, Corner corner,
+                          const Shade& shade, bool fitted, BlockColours& colours) {
+  blendOver(
+      e, footprint, corner,
+      [&](const Pixels& pixels, V(&value)[4]) HWY_ATTR {
+        if (fitted)
+          shade.valuesAt<true>(pixels, value);
+        else
+          shade.valuesAt<false>(pixels, value);
+      },
+      colours);
+}
+
+/// Paints a block: blend(its colours). Returns whether it is saturated then.
+template <typename Blend>
+HWY_INLINE bool paintBlock(float* HWY_RESTRICT block, const Blend& blend) {
+  BlockColours colours(block);
+  blend(colours);
+  colours.store(block);
+  return colours.areSaturated();
 }
 
 /// The scalar: mean + reach (tp p + tq q), ± half_width. What is seen of the splat, if that is something else, has the
@@ -296,21 +348,21 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Tables
   return true;
 }
 
-HWY_INLINE bool paintLookedUp(const LookedUp& in, const Lit& lit, float* HWY_RESTRICT block) {
+HWY_INLINE void blendLookedUp(const LookedUp& in, const Lit& lit, BlockColours& colours) {
   const Floats d;
-  V most = hn::Zero(d);
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    if (!anyOf(in.touched, lane)) {
-      most = hn::Max(most, hn::Load(d, block + 3 * kBlockPixels + lane));
-      continue;
-    }
+  for (size_t v = 0; v < BlockColours::kVectors; ++v) {
+    const size_t lane = v * hn::Lanes(d);
+    if (!anyOf(in.touched, lane)) continue;
     V value[4];
     meansOf(in.integrals, hn::Load(d, in.scale.at + lane), lane, value);
     const V white = hn::Mul(value[3], hn::Set(d, lit.specular));
     for (int c = 0; c < 3; ++c) value[c] = hn::MulAdd(value[c], hn::Set(d, lit.diffuse), white);
-    most = hn::Max(most, blendUnder(block + lane, hn::Load(d, in.depth.at + lane), value));
+    colours.blendUnder(v, hn::Load(d, in.depth.at + lane), value);
   }
-  return isSaturated(most);
+}
+
+HWY_INLINE bool paintLookedUp(const LookedUp& in, const Lit& lit, float* HWY_RESTRICT block) {
+  return paintBlock(block, [&](BlockColours& colours) HWY_ATTR { blendLookedUp(in, lit, colours); });
 }
 
 }  // namespace HWY_NAMESPACE

@@ -166,37 +166,40 @@ struct CutShade {
   float per_deviation;
 };
 
-/// One block of a splat that is cut, by one parabola, or one colour. Whether it is saturated now.
-template <bool kFitted>
-HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const CutShade& cut_shade,
-                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, Corner corner) {
-  const Shade& shade = cut_shade.whole;
+/// Blends what is left of a splat that is cut over a block: values_at(pixels, the interval that is left, its share, out).
+template <typename ValuesAt>
+HWY_INLINE void blendCut(const Ellipse& e, const Cuts& cuts, const float* HWY_RESTRICT footprint,
+                         Corner corner, const ValuesAt& values_at, BlockColours& colours) {
   const Floats d;
-  V most = hn::Zero(d);
-  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
+  for (size_t v = 0; v < BlockColours::kVectors; ++v) {
+    const size_t lane = v * hn::Lanes(d);
     const Pixels pixels = pixelsAt(e, corner, lane);
-    Interval left{hn::Zero(d), hn::Zero(d)};
-    V share = hn::Zero(d);
-    if (!pixels.areOutside()) {
-      left = intervalAt(cuts, pixels, lane);
-      share = left.share();
-    }
-    if (hn::AllTrue(d, hn::Eq(share, hn::Zero(d)))) {
-      most = hn::Max(most, hn::Load(d, block + 3 * kBlockPixels + lane));
-      continue;
-    }
+    if (pixels.areOutside()) continue;
+    const Interval left = intervalAt(cuts, pixels, lane);
+    const V share = left.share();
+    if (hn::AllTrue(d, hn::Eq(share, hn::Zero(d)))) continue;
     V value[4];
-    if constexpr (kFitted) {
-      const V s = hn::MulAdd(left.mean(share), hn::Set(d, cut_shade.per_deviation), shade.s.at(pixels));
-      for (int c = 0; c < 4; ++c)
-        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
-                              hn::Set(d, shade.at[c]));
-    } else {
-      for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
-    }
-    most = hn::Max(most, blendUnder(block + lane, hn::Mul(depthAt(e, footprint, pixels), share), value));
+    values_at(pixels, left, share, value);
+    colours.blendUnder(v, hn::Mul(depthAt(e, footprint, pixels), share), value);
   }
-  return isSaturated(most);
+}
+
+/// The same by one parabola, or one colour.
+HWY_INLINE void blendCut(const Ellipse& e, const Cuts& cuts, const float* HWY_RESTRICT footprint,
+                         Corner corner, const CutShade& cut_shade, bool fitted, BlockColours& colours) {
+  const Floats d;
+  blendCut(
+      e, cuts, footprint, corner,
+      [&](const Pixels& pixels, const Interval& left, V share, V(&value)[4]) HWY_ATTR {
+        const Shade& shade = cut_shade.whole;
+        if (!fitted) return shade.valuesAt<false>(pixels, value);
+        if (cut_shade.per_deviation == 0) return shade.valuesAt<true>(pixels, value);
+        const V s = hn::MulAdd(left.mean(share), hn::Set(d, cut_shade.per_deviation), shade.s.at(pixels));
+        for (int c = 0; c < 4; ++c)
+          value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
+                                hn::Set(d, shade.at[c]));
+      },
+      colours);
 }
 
 /// Looks up the colours of a splat that is cut. Returns whether anything is left of it in the block.
@@ -218,19 +221,23 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
     const uint32_t touched = bitsOf(hn::Gt(depth, hn::Zero(d)));
     if (touched == 0) continue;
     out.touched |= touched << lane;
-    const V moved = left.mean(share);
     const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
     hn::Store(depth, d, out.depth.at + lane);
-    const V mean = hn::MulAdd(hn::Set(d, faces.mean_per_deviation * ScreenCut::kReach), moved,
-                              hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)));
-    const float lost = 3 * faces.mean_per_deviation * faces.mean_per_deviation;
-    const V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lostVariance(share, moved),
-                                   hn::Set(d, scalar.half_width * scalar.half_width));
-    locate(tables.shading, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
+    V mean = hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean));
+    V half_width = hn::Set(d, scalar.half_width), seen_half_width = hn::Set(d, scalar.seen_half_width);
+    if (faces.mean_per_deviation != 0) {
+      const V moved = left.mean(share);
+      mean = hn::MulAdd(hn::Set(d, faces.mean_per_deviation * ScreenCut::kReach), moved, mean);
+      const float lost = 3 * faces.mean_per_deviation * faces.mean_per_deviation;
+      const V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lostVariance(share, moved),
+                                     hn::Set(d, scalar.half_width * scalar.half_width));
+      half_width = hn::Sqrt(hn::Max(width2, hn::Zero(d)));
+      seen_half_width = hn::Sqrt(hn::Max(hn::Sub(width2, hn::Set(d, hidden2)), hn::Zero(d)));
+    }
+    locate(tables.shading, mean, half_width, lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
     if (hides)
-      locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)),
-             hn::Sqrt(hn::Max(hn::Sub(width2, hn::Set(d, hidden2)), hn::Zero(d))), lane, nearer);
+      locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)), seen_half_width, lane, nearer);
   }
   if (out.touched == 0) return false;
   out.integrate(tables.shading, intervals);
@@ -310,11 +317,15 @@ HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number,
   if (work.shading.per_pixel)
     scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
   // On a logarithmic scale there is no bound of what a narrower distribution sees.
-  out.fit = work.table.logScale() && work.shading.per_pixel ? kOther : static_cast<Fit>(visit.fit());
+  const bool narrower = out.faces.mean_per_deviation != 0;
+  out.fit =
+      work.table.logScale() && work.shading.per_pixel && narrower ? kOther : static_cast<Fit>(visit.fit());
   if (out.fit == kOther) return;
   const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
   out.shade = {shadeOf(visit.fits, visit.n), inverse * out.faces.mean_per_deviation * ScreenCut::kReach};
-  out.shade.whole.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
+  out.shade.whole.s = narrower
+                          ? Along{0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq}
+                          : along(visit.all.pieces, visit.n, scalar, -1, 1);
 }
 
 /// Looks up a splat whose pixels have to be. Returns whether anything is left of it in the block.
@@ -328,42 +339,82 @@ HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float
   return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}}, tables, corner, out);
 }
 
-/// Paints one block of a splat that is not looked up, or is windowed. Returns whether it is saturated then.
-HWY_NOINLINE bool paintCutBlock(const TileWork& work, const CutSplat& cut, const float* footprint,
-                                int block) {
+/// Blends a splat that is fitted, and not windowed, over a block.
+HWY_INLINE void blendFitted(const CutSplat& cut, const float* footprint, int block, BlockColours& colours) {
   const Corner corner = cornerOf(block);
   const Left left = leftIn(cut.block_faces, corner);
-  if (left == Left::kNothing) return false;
-  const auto in_window = [&](float* at, const DepthWindow& window) HWY_ATTR {
+  const bool by_parabola = cut.fit == kParabola;
+  if (left == Left::kAll) blendOver(cut.e, footprint, corner, cut.shade.whole, by_parabola, colours);
+  if (left == Left::kSome)
+    blendCut(cut.e, {cut.faces, cut.line, {}}, footprint, corner, cut.shade, by_parabola, colours);
+}
+
+/// The same of one that has lines. The depths that are left do not move its scalar.
+HWY_INLINE void blendLines(const CutSplat& cut, const Lines& lines, const float* footprint, int block,
+                           BlockColours& colours) {
+  const Corner corner = cornerOf(block);
+  const Left left = leftIn(cut.block_faces, corner);
+  const Along& s = cut.shade.whole.s;
+  if (left == Left::kAll)
+    blendOver(
+        cut.e, footprint, corner,
+        [&](const Pixels& pixels, V(&value)[4]) HWY_ATTR { lines.valuesAt(s.at(pixels), value); }, colours);
+  if (left == Left::kSome)
+    blendCut(
+        cut.e, {cut.faces, cut.line, {}}, footprint, corner,
+        [&](const Pixels& pixels, const Interval&, V, V(&value)[4])
+            HWY_ATTR { lines.valuesAt(s.at(pixels), value); },
+        colours);
+}
+
+/// Paints one block of a splat that is windowed. Returns whether it is saturated then.
+HWY_NOINLINE bool paintWindowed(const TileWork& work, const CutSplat& cut, const float* footprint,
+                                int block) {
+  const Corner corner = cornerOf(block);
+  if (leftIn(cut.block_faces, corner) == Left::kNothing) return false;
+  return paintWindows(work, block, [&](float* at, const DepthWindow& window) HWY_ATTR {
     const Cuts cuts{cut.faces, cut.line, window};
-    if (cut.fit == kConstant) return paintBlock<false>(cut.e, cuts, cut.shade, footprint, at, corner);
-    if (cut.fit == kParabola) return paintBlock<true>(cut.e, cuts, cut.shade, footprint, at, corner);
+    if (cut.fit != kOther)
+      return paintBlock(at, [&](BlockColours& colours) HWY_ATTR {
+        blendCut(cut.e, cuts, footprint, corner, cut.shade, cut.fit == kParabola, colours);
+      });
     LookedUp looked_up;
     return lookUpBlock(cut.e, cut.scalar, cuts, {work.table, footprint}, corner, looked_up) &&
            paintLookedUp(looked_up, cut.lit, at);
-  };
-  if (cut.windowed) return paintWindows(work, block, in_window);
-  float* const at = work.tile + block * kBlockFloats;
-  if (left == Left::kAll && cut.fit == kConstant)
-    return paintBlock<false>(cut.e, cut.shade.whole, footprint, at, corner);
-  if (left == Left::kAll && cut.fit == kParabola)
-    return paintBlock<true>(cut.e, cut.shade.whole, footprint, at, corner);
-  return in_window(at, {});
+  });
+}
+
+/// Whether lines may do for the splat.
+HWY_INLINE bool mayHaveLines(const Visit& visit, const CutSplat& cut) {
+  return cut.isLookedUp() && cut.faces.mean_per_deviation == 0 && mayHaveLines(visit);
 }
 
 /// Returns those of `blocks` that are saturated then.
-HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const CutSplat& cut,
+HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Visit& visit, size_t number,
                                 const float* footprint) {
-  if (cut.isLookedUp())
-    return paintLookedUpBlocks(work, blocks, cut.lit, [&](int block, LookedUp& out) HWY_ATTR {
-      return lookUpCut(work, cut, footprint, block, out);
+  CutSplat cut;
+  makeCut(work, visit, number, cut);
+  if (cut.windowed)
+    return paintBlocks(blocks,
+                       [&](int block) HWY_ATTR { return paintWindowed(work, cut, footprint, block); });
+  const auto blend = [&](const auto& blend_block) HWY_ATTR {
+    return paintBlocks(blocks, [&](int block) HWY_ATTR {
+      return paintBlock(work.tile + block * kBlockFloats,
+                        [&](BlockColours& colours) HWY_ATTR { blend_block(block, colours); });
     });
-  BlockMask saturated = 0;
-  while (blocks != 0) {
-    const int block = takeFirst(blocks);
-    if (paintCutBlock(work, cut, footprint, block)) saturated |= BlockMask{1} << block;
+  };
+  if (cut.fit != kOther)
+    return blend([&](int block, BlockColours& colours)
+                     HWY_ATTR { blendFitted(cut, footprint, block, colours); });
+  Lines lines;
+  if (mayHaveLines(visit, cut) && fitLines(work, visit, lines)) {
+    cut.shade.whole.s = alongLines(visit);
+    return blend([&](int block, BlockColours& colours)
+                     HWY_ATTR { blendLines(cut, lines, footprint, block, colours); });
   }
-  return saturated;
+  return paintLookedUpBlocks(work, blocks, cut.lit, [&](int block, LookedUp& out) HWY_ATTR {
+    return lookUpCut(work, cut, footprint, block, out);
+  });
 }
 
 }  // namespace HWY_NAMESPACE

@@ -166,6 +166,7 @@ enum Fit : int32_t { kNothing, kConstant, kParabola, kOther };
 /// The fit of a piece: at + s (by + s bend), with s = -1 to 1 from end to end.
 struct Fits {
   Values at, by, bend;
+  Row excess;  // of a parabola's error over what is allowed, of kOther
   IntRow fit;
 
   /// Colours become what is seen of them in this light.
@@ -259,8 +260,137 @@ HWY_INLINE void fitPieces(const ShadingTable& table, const Pieces& pieces, size_
     fit = hn::IfThenElse(hn::Eq(most, hn::Zero(d)), code(kNothing), fit);
     fit = hn::IfThenElse(hn::Le(off, allowed), fit, code(kOther));
     hn::Store(hn::ConvertTo(Ints(), fit), Ints(), fits.fit.at + lane);
+    hn::Store(hn::Div(off, allowed), d, fits.excess.at + lane);
   }
 }
+
+/// Row, and its last element again: to be read from its second.
+struct alignas(64) LongRow {
+  float at[2 * kLanes];
+
+  HWY_INLINE void repeatLast() { at[kLanes] = at[kLanes - 1]; }
+};
+
+/// Interval of the scalar that moves from end to end of a piece.
+struct Moving {
+  float mean, reach, half_width;
+  float from, to;  // t
+};
+
+/// The means of the function at sixteen places of a piece.
+struct Knots {
+  LongRow of[4];
+  float error;  // of the lines from knot to knot, at the most
+  float most;   // extinction
+
+  /// Over a move by h cells a line is off by at most h min(h / 2w / 8, 1/4) times the sum of |second differences|
+  /// (ShadingTable); and on a logarithmic scale, where the move itself is bent, by an eighth of r (of twice that, since
+  /// r <= 0.3 changes within the move) times the largest slope.
+  HWY_INLINE void set(const ShadingTable& table, const Moving& moving) {
+    const Floats d;
+    const float per_part = (moving.to - moving.from) / (kLanes - 1);
+    Intervals intervals;
+    LongRow begins, ends;
+    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+      const V t =
+          hn::MulAdd(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, per_part), hn::Set(d, moving.from));
+      const V mean = hn::MulAdd(hn::Set(d, moving.reach), t, hn::Set(d, moving.mean));
+      const Range range = locate(table, mean, hn::Set(d, moving.half_width), lane, intervals);
+      hn::Store(range.from, d, begins.at + lane);
+      hn::Store(range.to, d, ends.at + lane);
+    }
+    begins.repeatLast();
+    ends.repeatLast();
+    alignas(64) float integrals[4 * kLanes];
+    integrate(table, intervals, kLanes, integrals);
+    V largest = hn::Zero(d);
+    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+      V value[4];
+      meansOf(integrals, hn::Load(d, intervals.scale.at + lane), lane, value);
+      for (size_t c = 0; c < 4; ++c) hn::Store(value[c], d, of[c].at + lane);
+      largest = hn::Max(largest, value[3]);
+    }
+    for (LongRow& row : of) row.repeatLast();
+    most = hn::GetLane(hn::MaxOfLanes(d, largest));
+    const bool is_log = table.logScale();
+    const V log_unit = hn::Set(d, is_log ? 1 / table.scale() : 0.0f);
+    const float* bends = &table.bends()->second;
+    V off_most = hn::Zero(d);
+    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+      const V begin = hn::Load(d, begins.at + lane), end = hn::LoadU(d, ends.at + lane + 1);
+      const V begin_after = hn::LoadU(d, begins.at + lane + 1), end_before = hn::Load(d, ends.at + lane);
+      const V move = hn::Max(hn::Abs(hn::Sub(begin_after, begin)), hn::Abs(hn::Sub(end, end_before)));
+      const V low = hn::Min(begin, begin_after), high = hn::Max(end, end_before);
+      const auto first = hn::ShiftLeft<1>(element(hn::Sub(low, hn::Set(d, 1.0f))));
+      const auto last =
+          hn::ShiftLeft<1>(hn::Add(element(hn::Add(high, hn::Set(d, 1.0f))), hn::Set(Ints(), 1)));
+      const V second = hn::Sub(hn::GatherIndex(d, bends, last), hn::GatherIndex(d, bends, first));
+      const V over_width = hn::Mul(hn::Set(d, 0.125f), hn::Mul(move, hn::Load(d, intervals.scale.at + lane)));
+      V off = hn::Mul(hn::Mul(move, hn::Min(over_width, hn::Set(d, 0.25f))), second);
+      if (is_log) {
+        V change = hn::Zero(d);
+        for (const LongRow& row : of)
+          change = hn::Max(change, hn::AbsDiff(hn::LoadU(d, row.at + lane + 1), hn::Load(d, row.at + lane)));
+        const V r = hn::Mul(move, hn::Abs(log_unit));
+        off = hn::MulAdd(hn::Mul(hn::Set(d, 0.25f), r), hn::Add(change, hn::Mul(move, second)), off);
+        off = hn::IfThenElse(hn::Gt(r, hn::Set(d, 0.3f)), hn::Set(d, 1e30f), off);
+      }
+      off_most = hn::Max(off_most, off);
+    }
+    error = hn::GetLane(hn::MaxOfLanes(d, off_most));
+  }
+
+  HWY_INLINE bool areWithin(float amplitude) const {
+    return error <= std::max(kRelativeError * most, kDepthError / (kPeak * amplitude));
+  }
+};
+
+/// Lines from knot to knot, where a parabola does not do for a piece: s = 0 to kParts from end to end.
+struct Lines {
+  static constexpr float kParts = kLanes - 1;
+
+  Values knots;
+
+  /// Does what Fits::light() does.
+  HWY_INLINE void light(const Lit& lit) {
+    const Floats d;
+    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+      const V white = hn::Mul(hn::Load(d, knots.of[3].at + lane), hn::Set(d, lit.specular));
+      for (int c = 0; c < 3; ++c) {
+        float* const value = knots.of[c].at + lane;
+        hn::Store(hn::MulAdd(hn::Load(d, value), hn::Set(d, lit.diffuse), white), d, value);
+      }
+    }
+  }
+
+  HWY_INLINE void valuesAt(V s, V (&value)[4]) const {
+    const Floats d;
+    // The last part ends at a float below kParts, so that each has a knot behind it.
+    s = hn::Clamp(s, hn::Zero(d), hn::Set(d, kParts - 1e-6f * kParts));
+    const V whole = hn::Floor(s), part = hn::Sub(s, whole);
+    const auto n = integerOf(whole), next = hn::Add(n, hn::Set(Ints(), 1));
+    for (int c = 0; c < 4; ++c) {
+      const V from = lookUp(knots.of[c], n);
+      value[c] = hn::MulAdd(part, hn::Sub(lookUp(knots.of[c], next), from), from);
+    }
+  }
+
+ private:
+  HWY_INLINE static V lookUp(const Row& row, hn::Vec<Ints> n) {
+    const Floats d;
+    if constexpr (hn::MaxLanes(d) == kLanes) {
+      return hn::TableLookupLanes(hn::Load(d, row.at), hn::IndicesFromVec(d, n));
+    } else if constexpr (2 * hn::MaxLanes(d) == kLanes) {
+      const auto half = hn::Set(Ints(), kLanes / 2);
+      const auto in_half = hn::IndicesFromVec(d, hn::And(n, hn::Set(Ints(), kLanes / 2 - 1)));
+      return hn::IfThenElse(hn::RebindMask(d, hn::Lt(n, half)),
+                            hn::TableLookupLanes(hn::Load(d, row.at), in_half),
+                            hn::TableLookupLanes(hn::Load(d, row.at + kLanes / 2), in_half));
+    } else {
+      return hn::GatherIndex(d, row.at, n);
+    }
+  }
+};
 
 /// Flat splats: `at` and `fit`, of their means alone.
 HWY_INLINE void fitMeans(const ShadingTable& table, const Pieces& pieces, size_t count, Fits& fits) {

@@ -35,36 +35,33 @@ struct alignas(64) Plain {
 };
 static_assert(sizeof(Plain) == 128);
 
-/// blend() of some pixels of a block.
-HWY_INLINE void blendPlain(const Plain& plain, const float* footprint, Corner corner, size_t lane,
-                           V (&colour)[3], V& through) {
-  const auto& [e, shade, fitted] = plain;
-  const Pixels pixels = pixelsAt(e, corner, lane);
-  if (pixels.areOutside()) return;
-  const V depth = depthAt(e, footprint, pixels);
-  V value[4];
-  if (fitted)
-    shade.valuesAt<true>(pixels, value);
-  else
-    shade.valuesAt<false>(pixels, value);
-  blend(depth, value, colour, through);
+/// A splat with lines.
+struct alignas(64) Lined {
+  Ellipse e;
+  Along s;
+  Lines lines;
+};
+
+HWY_INLINE void blendPlain(const Plain& plain, const float* footprint, Corner corner, BlockColours& colours) {
+  blendOver(plain.e, footprint, corner, plain.shade, plain.fitted, colours);
+}
+
+HWY_INLINE void blendLined(const Lined& lined, const float* footprint, Corner corner, BlockColours& colours) {
+  blendOver(
+      lined.e, footprint, corner,
+      [&](const Pixels& pixels, V(&value)[4]) HWY_ATTR { lined.lines.valuesAt(lined.s.at(pixels), value); },
+      colours);
 }
 
 // These paint `blocks`, and return those of them that are saturated then.
 
-HWY_INLINE BlockMask paintPlain(const TileWork& work, BlockMask blocks, const Plain& plain,
-                                const float* footprint) {
-  BlockMask saturated = 0;
-  while (blocks != 0) {
-    const int block = takeFirst(blocks);
-    float* const at = work.tile + block * kBlockFloats;
-    const auto& [e, shade, fitted] = plain;
-    const Corner corner = cornerOf(block);
-    const bool full = fitted ? paintBlock<true>(e, shade, footprint, at, corner)
-                             : paintBlock<false>(e, shade, footprint, at, corner);
-    if (full) saturated |= BlockMask{1} << block;
-  }
-  return saturated;
+/// blend(the corner of a block, its colours)
+template <typename Blend>
+HWY_INLINE BlockMask blendBlocks(const TileWork& work, BlockMask blocks, const Blend& blend) {
+  return paintBlocks(blocks, [&](int block) HWY_ATTR {
+    return paintBlock(work.tile + block * kBlockFloats,
+                      [&](BlockColours& colours) HWY_ATTR { blend(cornerOf(block), colours); });
+  });
 }
 
 HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
@@ -72,13 +69,6 @@ HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks,
   return paintLookedUpBlocks(work, blocks, lit, [&](int block, LookedUp& out) HWY_ATTR {
     return lookUpBlock(e, scalar, {work.table, footprint}, cornerOf(block), out);
   });
-}
-
-/// The change from `begin` to `end` over piece n.
-HWY_INLINE Along along(const Pieces& pieces, size_t n, const Scalar& scalar, float begin, float end) {
-  const float from = pieces.from.at[n];
-  const float per_t = (end - begin) / (pieces.to.at[n] - from);
-  return {begin - from * per_t, per_t * scalar.tp, per_t * scalar.tq};
 }
 
 HWY_INLINE bool isPlain(const Visit& visit) {
@@ -92,14 +82,28 @@ HWY_INLINE void makePlain(const Visit& visit, Plain* place) {
   if (plain.fitted) plain.shade.s = along(visits.pieces, n, visit.scalar(), -1, 1);
 }
 
+/// Whether lines do for the splat: then they are at `place`.
+HWY_INLINE bool makeLined(const TileWork& work, const Visit& visit, Lined& place) {
+  if (!mayHaveLines(visit) || !fitLines(work, visit, place.lines)) return false;
+  place.e = visit.ellipse();
+  place.s = alongLines(visit);
+  return true;
+}
+
 HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visit& visit,
                                 const float* footprint) {
   if (isPlain(visit)) {
     alignas(Plain) std::byte place[sizeof(Plain)];
     auto* const plain = reinterpret_cast<Plain*>(place);
     makePlain(visit, plain);
-    return paintPlain(work, blocks, *plain, footprint);
+    return blendBlocks(work, blocks, [&](Corner corner, BlockColours& colours) HWY_ATTR {
+      blendPlain(*plain, footprint, corner, colours);
+    });
   }
+  if (Lined lined; makeLined(work, visit, lined))
+    return blendBlocks(work, blocks, [&](Corner corner, BlockColours& colours) HWY_ATTR {
+      blendLined(lined, footprint, corner, colours);
+    });
   return paintPixelByPixel(work, blocks, visit.ellipse(), visit.scalar(), visit.all.lit(work, visit.n),
                            footprint);
 }
@@ -141,11 +145,7 @@ struct Prepared {
     const auto number = static_cast<size_t>(numbers.at[n]);
     if (work.colours) return paintColoured(work, blocks, {visits, fits, colours, n}, number, footprint);
     const Visit visit{visits, fits, n};
-    if (visits.cut.at[n] != 0) {
-      CutSplat cut;
-      makeCut(work, visit, number, cut);
-      return paintCut(work, blocks, cut, footprint);
-    }
+    if (visits.cut.at[n] != 0) return paintCut(work, blocks, visit, number, footprint);
     return paintVisit(work, blocks, visit, footprint);
   }
 };
@@ -182,52 +182,91 @@ class Listed {
   /// Paints a part of an order tile's list in its block. Whether that is saturated then. Some are looked up before the
   /// first of them is blended: what was written as many narrow vectors is not ready at once to be read as a wide one.
   HWY_INLINE bool paint(const OrderList& list, int block) {
-    bool found[kAtOnce];
+    const Corner corner = cornerOf(block);
+    float* const at = work_->tile + block * kBlockFloats;
+    BlockColours colours(at);
+    bool found[kAtOnce], saturated = false;
     lookAhead(list, 0);
-    for (size_t begin = 0; begin < list.size(); begin += kAtOnce) {
+    for (size_t begin = 0; begin < list.size() && !saturated; begin += kAtOnce) {
       lookAhead(list, begin + kAtOnce);
       const OrderList some = list.subspan(begin, std::min(kAtOnce, list.size() - begin));
       for (size_t n = 0; n < some.size(); ++n) {
         const uint32_t number = numberOf(some[n]);
         if (places_[number].way == kUnknown) prepare(number / kLanes);
-        const auto [way, at] = places_[number];
+        const auto [way, place] = places_[number];
         if (way == kPixels)
-          found[n] = lookUpBlock(pixelwise_[at].e, pixelwise_[at].scalar, {work_->table, footprint_},
-                                 cornerOf(block), looked_up_[n]);
+          found[n] = lookUpBlock(pixelwise_[place].e, pixelwise_[place].scalar, {work_->table, footprint_},
+                                 corner, looked_up_[n]);
         else if (way == kCutPixels)
-          found[n] = lookUpCut(*work_, cuts_[at], footprint_, block, looked_up_[n]);
+          found[n] = lookUpCut(*work_, cuts_[place], footprint_, block, looked_up_[n]);
       }
-      for (size_t n = 0; n < some.size();) {
-        const Place place = places_[numberOf(some[n])];
-        if (place.way == kPlain) {
-          if (paintPlains(some, n, block)) return true;
-        } else {
-          const bool is_looked_up = place.way == kPixels || place.way == kCutPixels;
-          if (is_looked_up ? found[n] && paintFound(looked_up_[n], place, block) : paintOther(place, block))
-            return true;
-          ++n;
+      for (size_t n = 0; n < some.size() && !saturated; ++n) {
+        const auto [way, place] = places_[numberOf(some[n])];
+        switch (way) {
+          case kPlain:
+            blendPlain(plains_[place], footprint_, corner, colours);
+            break;
+          case kLines:
+            blendLined(lined_[place], footprint_, corner, colours);
+            break;
+          case kPixels:
+            if (found[n]) blendLookedUp(looked_up_[n], pixelwise_[place].lit, colours);
+            break;
+          case kCutPixels:
+            if (found[n]) blendLookedUp(looked_up_[n], cuts_[place].lit, colours);
+            break;
+          case kCut:
+            blendFitted(cuts_[place], footprint_, block, colours);
+            break;
+          case kCutLines:
+            blendLines(lined_cuts_[place].cut, lined_cuts_[place].lines, footprint_, block, colours);
+            break;
+          case kWindowed:
+          case kColoured:
+            colours.store(at);
+            saturated = paintOther(way, place, block);
+            colours.load(at);
+            continue;
+          default:
+            continue;
         }
+        saturated = colours.areSaturated();
       }
     }
-    return false;
+    colours.store(at);
+    return saturated;
   }
 
   uint64_t preparedBytes() const {
     return plains_.size() * sizeof(Plain) + pixelwise_.size() * sizeof(PixelwiseSplat) +
-           cuts_.size() * sizeof(CutSplat) + coloured_.size() * sizeof(Prepared);
+           lined_.size() * sizeof(Lined) + cuts_.size() * sizeof(CutSplat) +
+           lined_cuts_.size() * sizeof(LinedCut) + coloured_.size() * sizeof(Prepared);
   }
 
   void forget() {
     std::fill(places_.begin(), places_.end(), Place{});
     plains_.clear();
+    lined_.clear();
     pixelwise_.clear();
     cuts_.clear();
+    lined_cuts_.clear();
     coloured_.clear();
   }
 
  private:
   static constexpr size_t kAtOnce = 8;
-  enum Way : uint32_t { kUnknown, kPlain, kPixels, kCutPixels, kCut, kColoured, kNoWay };
+  enum Way : uint32_t {
+    kUnknown,
+    kPlain,
+    kLines,
+    kPixels,
+    kCut,
+    kCutLines,
+    kCutPixels,
+    kWindowed,
+    kColoured,
+    kNoWay
+  };
   /// The place of a splat's preparation: `at` counts in the vector of its way; of kColoured, in lanes of
   /// coloured_.
   struct Place {
@@ -238,6 +277,10 @@ class Listed {
     Ellipse e;
     Scalar scalar;
     Lit lit;
+  };
+  struct alignas(64) LinedCut {
+    CutSplat cut;
+    Lines lines;
   };
 
   template <typename Prepared>
@@ -250,8 +293,12 @@ class Listed {
       prefetchAll(plains_[place.at]);
     else if (place.way == kPixels)
       prefetchAll(pixelwise_[place.at]);
-    else if (place.way == kCutPixels || place.way == kCut)
+    else if (place.way == kLines)
+      prefetchAll(lined_[place.at]);
+    else if (place.way == kCutPixels || place.way == kCut || place.way == kWindowed)
       prefetchAll(cuts_[place.at]);
+    else if (place.way == kCutLines)
+      prefetchAll(lined_cuts_[place.at]);
   }
   /// Fetches what is prepared of the next splats from `begin` on, and the places of those behind them. Blocks
   /// need splats in orders of their own, from more memory than a core's nearest cache holds.
@@ -260,59 +307,10 @@ class Listed {
     for (size_t n = begin; n < end; ++n) prefetch(places_[numberOf(list[n])]);
     for (size_t n = end; n < last; ++n) hwy::Prefetch(&places_[numberOf(list[n])]);
   }
-  HWY_INLINE float* placeOf(int block) const { return work_->tile + block * kBlockFloats; }
-
-  HWY_INLINE bool paintFound(const LookedUp& found, Place place, int block) const {
-    const Lit lit = place.way == kPixels ? pixelwise_[place.at].lit : cuts_[place.at].lit;
-    return paintLookedUp(found, lit, placeOf(block));
-  }
-
-  HWY_NOINLINE bool paintOther(Place place, int block) {
-    switch (place.way) {
-      case kCut:
-        return paintCutBlock(*work_, cuts_[place.at], footprint_, block);
-      case kColoured: {
-        const BlockMask bit = BlockMask{1} << block;
-        const Prepared& group = coloured_[place.at / kLanes];
-        const size_t n = place.at % kLanes;
-        return group.paint(*work_, bit, n, footprint_) != 0;
-      }
-      default:
-        return false;
-    }
-  }
-
-  /// Paints the splats from the n-th on that are plain, leaves n behind them and returns whether the block is
-  /// saturated then. The colours stay in registers.
-  HWY_INLINE bool paintPlains(const OrderList& list, size_t& n, int block) {
-    const Floats d;
-    const Corner corner = cornerOf(block);
-    float* HWY_RESTRICT const at = placeOf(block);
-    constexpr size_t kVectors = kBlockPixels / hn::MaxLanes(d);
-    V colour[kVectors][3], through[kVectors];
-    for (size_t v = 0; v < kVectors; ++v) {
-      const size_t lane = v * hn::Lanes(d);
-      for (int c = 0; c < 3; ++c) colour[v][c] = hn::Load(d, at + c * kBlockPixels + lane);
-      through[v] = hn::Load(d, at + 3 * kBlockPixels + lane);
-    }
-    bool saturated = false;
-    Place next = places_[numberOf(list[n])];
-    do {
-      const Plain& plain = plains_[next.at];
-      if (++n < list.size()) next = places_[numberOf(list[n])];
-      V most = hn::Zero(d);
-      for (size_t v = 0; v < kVectors; ++v) {
-        blendPlain(plain, footprint_, corner, v * hn::Lanes(d), colour[v], through[v]);
-        most = hn::Max(most, through[v]);
-      }
-      saturated = isSaturated(most);
-    } while (!saturated && n < list.size() && next.way == kPlain);
-    for (size_t v = 0; v < kVectors; ++v) {
-      const size_t lane = v * hn::Lanes(d);
-      for (int c = 0; c < 3; ++c) hn::Store(colour[v][c], d, at + c * kBlockPixels + lane);
-      hn::Store(through[v], d, at + 3 * kBlockPixels + lane);
-    }
-    return saturated;
+  HWY_NOINLINE bool paintOther(Way way, uint32_t place, int block) {
+    if (way == kWindowed) return paintWindowed(*work_, cuts_[place], footprint_, block);
+    const Prepared& group = coloured_[place / kLanes];
+    return group.paint(*work_, BlockMask{1} << block, place % kLanes, footprint_) != 0;
   }
 
   HWY_NOINLINE void prepare(size_t number) {
@@ -332,13 +330,25 @@ class Listed {
     if (work_->colours)
       return {kColoured, last(coloured_) * uint32_t{kLanes} + static_cast<uint32_t>(visit.n)};
     if (visit.all.cut.at[visit.n] != 0) {
-      makeCut(*work_, visit, splat, cuts_.emplace_back());
-      return {cuts_.back().isLookedUp() ? kCutPixels : kCut, last(cuts_)};
+      CutSplat& cut = cuts_.emplace_back();
+      makeCut(*work_, visit, splat, cut);
+      if (cut.windowed) return {kWindowed, last(cuts_)};
+      if (cut.fit != kOther) return {kCut, last(cuts_)};
+      if (!mayHaveLines(visit, cut) || !fitLines(*work_, visit, lined_cuts_.emplace_back().lines)) {
+        if (mayHaveLines(visit, cut)) lined_cuts_.pop_back();
+        return {kCutPixels, last(cuts_)};
+      }
+      cut.shade.whole.s = alongLines(visit);
+      lined_cuts_.back().cut = cut;
+      cuts_.pop_back();
+      return {kCutLines, last(lined_cuts_)};
     }
     if (isPlain(visit)) {
       makePlain(visit, &plains_.emplace_back());
       return {kPlain, last(plains_)};
     }
+    if (makeLined(*work_, visit, lined_.emplace_back())) return {kLines, last(lined_)};
+    lined_.pop_back();
     pixelwise_.push_back({visit.ellipse(), visit.scalar(), visit.all.lit(*work_, visit.n)});
     return {kPixels, last(pixelwise_)};
   }
@@ -349,8 +359,10 @@ class Listed {
   LookedUp looked_up_[kAtOnce];
   std::vector<Place> places_;  // [splat]
   std::vector<Plain> plains_;
+  std::vector<Lined> lined_;
   std::vector<PixelwiseSplat> pixelwise_;
   std::vector<CutSplat> cuts_;
+  std::vector<LinedCut> lined_cuts_;
   std::vector<Prepared> coloured_;  // in pictures of two scalars
 };
 

@@ -37,6 +37,7 @@ struct Visits {
   Row nearer, seen_half_width;  // Scalar's
   Row cell_depth;               // geometric, of their cells
   Row diffuse, specular;        // Lit, in lit pictures
+  Row pixels;                   // of the tile, in the ellipse's own rectangle
   Pieces pieces;                // all of the splat that is in the tile
   IntRow skew;                  // ScreenSplat's
 
@@ -100,6 +101,10 @@ HWY_INLINE V hidesItself(const TileWork& work, V cell_depth, V along) {
                  hn::Min(hn::Mul(tau, hn::Set(d, 1.0f / 6)), hn::Set(d, 1.0f)));
 }
 
+// The least pixels of a splat's rectangle in a tile for which lines are worth their fit; the largest error of a parabola,
+// over what is allowed, for which they are tried.
+constexpr float kMinLinesPixels = 96, kMaxLinesExcess = 60;
+
 // The least hidesItself() that is worth the work, in cells of the table: a 250th of the function.
 constexpr float kHidingCells = 16;
 
@@ -136,6 +141,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const V y0 = hn::Clamp(hn::Ceil(hn::Sub(y, reach_y)), zero, hn::Set(d, kTileSide));
     const V x1 = hn::Clamp(hn::Floor(hn::Add(x, reach_x)), hn::Neg(one), last_pixel);
     const V y1 = hn::Clamp(hn::Floor(hn::Add(y, reach_y)), hn::Neg(one), last_pixel);
+    store(hn::Mul(hn::Add(hn::Sub(x1, x0), one), hn::Add(hn::Sub(y1, y0), one)), out.pixels);
     if (work.shading.lit) {
       const auto bits = hn::BitCast(Ints(), gather(work, offsets, 9));
       const auto share = [&](auto shifted, int32_t mask) HWY_ATTR {
@@ -187,7 +193,8 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
       const V kept = hn::Sqrt(hn::Max(hn::NegMulAdd(correlation, correlation, one), zero));
       reach = hn::IfThenElse(cut, hn::Add(reach, moved), reach);
       width_loss = hn::IfThenElseZero(cut, hn::Mul(half_width, hn::Sub(one, kept)));
-      t = {hn::IfThenElse(cut, hn::Neg(one), t.from), hn::IfThenElse(cut, one, t.to)};
+      const auto moves = hn::And(cut, hn::Or(hn::Gt(moved, zero), hides));
+      t = {hn::IfThenElse(moves, hn::Neg(one), t.from), hn::IfThenElse(moves, one, t.to)};
     }
     store(reach, out.pieces.reach);
     store(width_loss, out.pieces.width_loss);
@@ -205,6 +212,17 @@ HWY_INLINE int takeFirst(BlockMask& blocks) {
 HWY_INLINE Corner cornerOf(int block) {
   return {static_cast<float>(block % kTileBlocks * kBlockSide),
           static_cast<float>(block / kTileBlocks * kBlockSide)};
+}
+
+/// Paints blocks: paint(block), whether it is saturated then. Returns those that are.
+template <typename Paint>
+HWY_INLINE BlockMask paintBlocks(BlockMask blocks, const Paint& paint) {
+  BlockMask saturated = 0;
+  while (blocks != 0) {
+    const int block = takeFirst(blocks);
+    if (paint(block)) saturated |= BlockMask{1} << block;
+  }
+  return saturated;
 }
 
 /// Paints blocks with a look-up for every pixel: look_up(block, where to), false for nothing. A few blocks
@@ -287,6 +305,9 @@ HWY_INLINE void fitNearSides(const ShadingTable& table, Visits& visits, size_t c
       replace(fits.by, hn::Mul(half, hn::Sub(value[2][c], value[0][c])));
       replace(fits.bend, hn::Sub(hn::Mul(half, hn::Add(value[0][c], value[2][c])), value[1][c]));
     }
+    float* const excess = fits.excess.at + lane;
+    const V of_both = hn::Max(hn::Load(d, excess), hn::Load(d, seen.excess.at + lane));
+    hn::Store(hn::IfThenElse(hides, of_both, hn::Load(d, excess)), d, excess);
     // The worse of both; nothing only where the whole has nothing.
     const auto fit = hn::Load(Ints(), fits.fit.at + lane), of_seen = hn::Load(Ints(), seen.fit.at + lane);
     const auto worse = hn::IfThenElseZero(hn::Gt(fit, hn::Set(Ints(), kNothing)), hn::Max(fit, of_seen));
@@ -304,6 +325,54 @@ struct Visit {
   HWY_INLINE Scalar scalar() const { return all.scalar(n); }
   HWY_INLINE int32_t fit() const { return fits.fit.at[n]; }
 };
+
+/// Whether lines may do for a splat where a parabola does not, and be worth their fit: as much work as some blocks looked
+/// up. Which blocks are open does not count: another process may know of others.
+HWY_INLINE bool mayHaveLines(const Visit& visit) {
+  return visit.all.pixels.at[visit.n] >= kMinLinesPixels && visit.fits.excess.at[visit.n] < kMaxLinesExcess;
+}
+
+/// Fits lines to what is seen of a splat. Returns whether they are good enough.
+HWY_INLINE bool fitLines(const TileWork& work, const Visit& visit, Lines& lines) {
+  const auto& [visits, fits, n] = visit;
+  const ShadingTable& table = work.table;
+  const Floats d;
+  const Pieces& pieces = visits.pieces;
+  Moving moving{pieces.mean.at[n], pieces.reach.at[n], pieces.half_width.at[n], pieces.from.at[n],
+                pieces.to.at[n]};
+  Knots all, seen;
+  all.set(table, moving);
+  if (!all.areWithin(pieces.amplitude.at[n])) return false;
+  const bool hides = visits.nearer.at[n] != 0;
+  if (hides) {
+    moving.mean -= visits.nearer.at[n];
+    moving.half_width = visits.seen_half_width.at[n];
+    seen.set(table, moving);
+    if (!seen.areWithin(pieces.amplitude.at[n])) return false;
+  }
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V value[4], of_near[4];
+    for (int c = 0; c < 4; ++c) value[c] = hn::Load(d, all.of[c].at + lane);
+    if (hides) {
+      for (int c = 0; c < 4; ++c) of_near[c] = hn::Load(d, seen.of[c].at + lane);
+      showNearSide(of_near, value);
+    }
+    for (int c = 0; c < 4; ++c) hn::Store(value[c], d, lines.knots.of[c].at + lane);
+  }
+  if (work.shading.lit) lines.light(visits.lit(work, n));
+  return true;
+}
+
+/// The change from `begin` to `end` over piece n.
+HWY_INLINE Along along(const Pieces& pieces, size_t n, const Scalar& scalar, float begin, float end) {
+  const float from = pieces.from.at[n];
+  const float per_t = (end - begin) / (pieces.to.at[n] - from);
+  return {begin - from * per_t, per_t * scalar.tp, per_t * scalar.tq};
+}
+
+HWY_INLINE Along alongLines(const Visit& visit) {
+  return along(visit.all.pieces, visit.n, visit.scalar(), 0, Lines::kParts);
+}
 
 HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
   Shade shade;
