@@ -380,6 +380,9 @@ class Conversion {
 
   FileInfo writeThinWalls() const {
     const auto bytes = std::as_bytes(std::span(splats_.thin_walls));
+    if (bytes.size() > kMaxThinWallsBytes)
+      throw Error("{}: has too many thin walls (found {} boxes, expected at most {})",
+                  options_.output.string(), splats_.thin_walls.size(), kMaxThinWallsBytes / sizeof(WallSide));
     writeFileDurably(partial_ / kThinWallsFileName, bytes);
     return {kThinWallsFileName, bytes.size(), checksumOf(bytes)};
   }

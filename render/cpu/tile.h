@@ -87,10 +87,10 @@ inline constexpr int kBlockFloats = 4 * kBlockPixels;
 inline constexpr int kTileBlocks = kTileSide / kBlockSide;  // along a side
 inline constexpr int kTileFloats = 4 * kTileSide * kTileSide;
 
-// A splat's mean extinction, and colour times extinction, are looked up for every pixel, unless a constant
-// or a parabola over the splat, as far as it is in the tile, is known to differ by less than this part of the
-// largest extinction there (which changes the opacity of all splats together by less than e^-1 / 256), or by
-// less than this optical depth. A flat splat, which has one colour throughout, is a constant.
+// A splat's mean extinction, and colour times extinction, are looked up for every pixel, unless a constant, a parabola
+// or, where a splat has many pixels in the tile, fifteen lines over the splat, as far as it is in the tile, are known to
+// differ by less than this part of the largest extinction there (which changes the opacity of all splats together by less
+// than e^-1 / 256), or by less than this optical depth. A flat splat, which has one colour throughout, is a constant.
 inline constexpr float kRelativeError = 1.0f / 256;
 inline constexpr float kDepthError = 2e-5f;
 
@@ -108,7 +108,7 @@ struct TileWindows {
   std::array<uint8_t, 64> open;  // of each block: how many windows, from the first, take more
 };
 
-/// The bytes that a thread may keep of prepared splats, of up to half a kilobyte each. A wake of 2.3 M splats
+/// The bytes that a thread may keep of prepared splats, of up to 600 bytes each. A wake of 2.3 M splats
 /// took 1.5 times the processor time with 1 MiB, 1.1 times with 2, and with 4 what it takes without a bound.
 inline constexpr uint64_t kMinPreparedBytes = uint64_t{1} << 19, kMaxPreparedBytes = uint64_t{4} << 20;
 

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <map>
+#include <system_error>
 #include <utility>
 
 #include "stream/base/error.h"
@@ -47,21 +48,29 @@ void WatchedFile::failAsChanged() const {
 
 namespace {
 
+/// Files are known by their whole names, however they were given.
 class Links {
  public:
   void add(const std::filesystem::path& from, std::set<std::filesystem::path> to) {
-    const MutexLock lock(mutex_);
-    if (!to.empty()) links_[from].merge(to);
+    const MutexLock lock(mutex);
+    if (!to.empty()) links_[keyOf(from)].merge(to);
   }
   std::set<std::filesystem::path> of(const std::filesystem::path& file) const {
-    const MutexLock lock(mutex_);
-    const auto found = links_.find(file);
+    const MutexLock lock(mutex);
+    const auto found = links_.find(keyOf(file));
     return found == links_.end() ? std::set<std::filesystem::path>() : found->second;
   }
 
+  mutable Mutex mutex;
+
  private:
-  mutable Mutex mutex_;
-  std::map<std::filesystem::path, std::set<std::filesystem::path>> links_ GUARDED_BY(mutex_);
+  static std::filesystem::path keyOf(const std::filesystem::path& file) {
+    std::error_code failed;
+    const std::filesystem::path whole = std::filesystem::absolute(file, failed);
+    return failed ? file : whole.lexically_normal();
+  }
+
+  std::map<std::filesystem::path, std::set<std::filesystem::path>> links_ GUARDED_BY(mutex);
 };
 
 Links& links() {
@@ -73,6 +82,10 @@ Links& links() {
 
 void noteLinks(const std::filesystem::path& from, const std::set<std::filesystem::path>& to) {
   links().add(from, to);
+}
+
+Mutex& linksMutex() {
+  return links().mutex;
 }
 
 WatchedFiles::WatchedFiles(const std::vector<std::string>& names) {

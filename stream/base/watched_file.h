@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "stream/base/mutex.h"
+
 namespace curvisplat {
 
 /// Tells whether a file is unchanged, without reading it.
@@ -48,6 +50,9 @@ class WatchedFile {
 
 /// Notes that a file leads to others, for WatchedFiles that are made later. Any thread.
 void noteLinks(const std::filesystem::path& from, const std::set<std::filesystem::path>& to);
+
+/// What has been noted is behind this mutex: whoever holds it while the process forks finds it free in both processes.
+Mutex& linksMutex();
 
 /// Some files, with those that they lead to at any depth (noteLinks()).
 class WatchedFiles {

@@ -460,6 +460,7 @@ TEST_F(FurtherScalarTest, OneIsAddedForTheIsosurfaceItWasChosenFor) {
   save();
   click("scalar of isosurface 2");
   click("isosurface 2 by further volume");
+  EXPECT_TRUE(eventually([] { return !hasWidget("isosurface 2 by further volume"); }));
   click("remove isosurface 1");
   ASSERT_TRUE(eventually([] { return hasWidget("isosurface 1 shows: volume"); }, 300));
   EXPECT_TRUE(eventually([] { return !hasWidget("isosurface 3 shows:"); }));

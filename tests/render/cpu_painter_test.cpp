@@ -154,7 +154,7 @@ TEST(CpuPainter, LeavesUntouchedPixelsAlone) {
     }
 }
 
-// The bounds that tile.h promises of constants and parabolas, one splat after the other: optical depths are
+// The bounds that tile.h promises of constants, parabolas and lines, one splat after the other: optical depths are
 // read off the alpha of a frame without a background.
 TEST_P(OnEveryTarget, FitsKeepTheirBound) {
   const ImageSize size{32, 32};  // a tile

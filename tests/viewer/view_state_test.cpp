@@ -484,6 +484,11 @@ TEST(RenderCommand, HasColoursOfSurfacesThatShowNoScalar) {
   state.surfaces[0].visible = true;
   EXPECT_NE(commandText(state).find("--surface-colour '#ff8000' --surface-colour '#00ff80'"),
             std::string::npos);
+  state.surfaces.clear();
+  state.faces.push_back({"blanks", {1, 0.5f, 0}, {}});  // which have no values
+  EXPECT_NE(commandText(state).find("--surface-colour '#00ff80' --surface-colour '#ff8000'"),
+            std::string::npos)
+      << commandText(state);
 }
 
 TEST(RenderCommand, HasMoreMemoryWhereTheViewHas) {

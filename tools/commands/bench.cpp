@@ -181,9 +181,9 @@ void benchRanks(const BenchArguments& arguments) {
   printLine("{}: {} samples in {}; scalar {}", arguments.cache.string(), manifest.nodes,
             countText(manifest.bricks, "brick"), manifest.variables[variable].name);
   printSection(
-      fmt::format("Simulated: one picture of {}x{} pixels at {:g} px, {} splats in {}", options.size.width,
-                  options.size.height, options.lod_pixels, shortCount(static_cast<double>(simulated.splats)),
-                  countText(simulated.parts, "brick")),
+      fmt::format("Simulated: one picture of {}x{} pixels at {:g} px, {} splats in {} of bricks",
+                  options.size.width, options.size.height, options.lod_pixels,
+                  shortCount(static_cast<double>(simulated.splats)), countText(simulated.parts, "part")),
       rankTable(simulated));
   Json json = reportOf(arguments, Machine::here(cache.path()), {});
   json["ranks"] = toJson(simulated);

@@ -136,8 +136,8 @@ ProbedPoints parseProbe(const ProbeArguments& arguments) {
   if (!std::filesystem::is_regular_file(text, ignored)) {
     if (text.find_first_not_of("0123456789.,+-eE ") != std::string::npos &&
         text.find(',') == std::string::npos)
-      throw UsageError("--probe {}: there is no such file; expected a point x,y,z, or a file of points",
-                       text);
+      throw UsageError("--probe {}: {}; expected a point x,y,z, or a file of points", text,
+                       std::filesystem::exists(text, ignored) ? "is not a file" : "there is no such file");
     return {false, {parsePoint("--probe", text)}, {}};
   }
   return {true, parsePointList(readTextFile(text, uint64_t{1} << 30), text), {}};

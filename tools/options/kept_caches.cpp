@@ -49,7 +49,9 @@ uint64_t checksumOfText(const std::string& text) {
 /// A file's state, as notes have it.
 std::string stampOf(const fs::path& file) {
   const FileState state = FileState::of(file);
-  return fmt::format("{} {} {} {}", state.bytes, state.changed_ns, state.number, state.device);
+  constexpr int64_t kNanoseconds = 1'000'000'000;
+  return fmt::format("{} {} {} {} {}", state.bytes, state.changed_ns / kNanoseconds,
+                     state.changed_ns % kNanoseconds, state.number, state.device);
 }
 
 uint64_t checksumOfFile(const fs::path& path, Progress& progress) {

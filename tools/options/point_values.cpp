@@ -134,12 +134,13 @@ std::string doubtOf(const Manifest& manifest, std::span<const glm::dvec3> points
       if (!of_cache[p] || of_cache[p]->is_beyond || !of_source[p]) continue;
       const double here = of_cache[p]->variables[v].value, there = of_source[p]->values[v];
       ++compared;
-      if (!(std::abs(here - there) > kFar * (variable.max - variable.min))) continue;
+      const double rounding = 1e-6 * std::max(std::abs(variable.min), std::abs(variable.max));
+      if (!(std::abs(here - there) > kFar * (variable.max - variable.min) + rounding)) continue;
       if (++far == 1)
         first = fmt::format("{} at {:g}, {:g}, {:g} is {:g} in the cache and {:g} in the files of --source",
                             variable.name, points[p].x, points[p].y, points[p].z, here, there);
     }
-    if (kOneIn * far > compared) return first + "; they may be of another time step";
+    if (far > 1 && kOneIn * far > compared) return first + "; they may be of another time step";
   }
   return "";
 }

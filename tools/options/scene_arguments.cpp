@@ -306,7 +306,8 @@ void checkSurfaceArguments(const SurfaceArguments& arguments, bool has_opacities
 
 std::string surfaceColourWithoutEffect(const SurfaceArguments& arguments) {
   if (arguments.colours.empty() || arguments.surface_by.empty() ||
-      std::ranges::any_of(arguments.surfaces, isSurfaceFile))
+      std::ranges::any_of(arguments.surfaces,
+                          [](const std::string& one) { return isSurfaceFile(one) || one == kBlanks; }))
     return "";
   return fmt::format(
       "--surface-colour {}: has no effect, since --surface-by {} colours the faces; leave one of them out",

@@ -375,9 +375,15 @@ void RemoteViewer::wake() {
 
 void RemoteViewer::loop() {
   nameThisThread("viewer");
-  const std::shared_ptr<const ServedCaches> caches = folders_.caches();
+  std::shared_ptr<const ServedCaches> caches;
+  try {
+    caches = folders_.caches();
+    send_(caches->helloText(), true);
+  } catch (const std::exception& error) {
+    printMessage("warning: a viewer: {}", error.what());
+    return;
+  }
   Work work(*this, *caches);
-  send_(caches->helloText(), true);
   while (true) {
     Inbox inbox;
     {

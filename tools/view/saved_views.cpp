@@ -292,6 +292,8 @@ void addIsosurfaces(const ViewState& state, CommandLine& words) {
   if (!groups.empty() && !state.iso_opacity.opaque()) words.add("--iso-opacity", text(state.iso_opacity));
 }
 
+constexpr const char* kBlanks = "blanks";  // faces without values, as --surface names them
+
 /// Adds options for surfaces, slices (but for a film's) and isosurfaces, except for those that are hidden.
 void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {
   std::vector<std::string> colours;
@@ -304,8 +306,11 @@ void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {
   for (const NamedFaces& named : state.faces)
     if (named.visible) add(named.name, named.colour);
   // Given once, or once for each surface; faces that show a scalar need none.
-  const bool has_files = std::ranges::any_of(state.surfaces, &SurfaceFile::visible);
-  if (!state.faces_by || has_files)
+  const bool has_own_colours = std::ranges::any_of(state.surfaces, &SurfaceFile::visible) ||
+                               std::ranges::any_of(state.faces, [](const NamedFaces& one) {
+                                 return one.visible && one.name == kBlanks;
+                               });
+  if (!state.faces_by || has_own_colours)
     for (const std::string& colour : colours) words.add("--surface-colour", colour);
   addSurfaceOpacities(state, words);
   if (state.faces_by && !state.faceNames().faces.empty()) words.add("--surface-by", state.faces_by->variable);

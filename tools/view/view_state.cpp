@@ -250,6 +250,7 @@ void hideUndrawn(const JsonField& fields, std::vector<Isosurface>& isosurfaces) 
   if (!drawn || fields.has("isosurfaces_of_all_scalars")) return;
   std::vector<double> values;
   for (const JsonField& value : drawn->elements(kMaxIsovalues)) values.push_back(value.number(-1e300, 1e300));
+  if (values.empty()) return;
   for (Isosurface& one : isosurfaces) one.visible &= std::ranges::find(values, one.value) != values.end();
 }
 

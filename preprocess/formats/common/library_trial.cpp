@@ -406,7 +406,7 @@ class TriedFiles {
 pid_t forkTrial() {
   loadDataLibraries();  // once, and not in each of the processes
   // HDF5's own state is that of no call, since all calls hold the lock; both processes give it back.
-  const MutexLock lock(dataLibraryMutex());
+  const MutexLock lock(dataLibraryMutex()), of_links(linksMutex());
   return ::fork();
 }
 
