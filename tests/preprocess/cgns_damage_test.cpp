@@ -76,10 +76,7 @@ TEST_P(CgnsDamage, FilesThatLinksLeadToAreWatchedToo) {
   const WatchedFiles files(grid->description().files);
   EXPECT_GT(allNodes(*grid, 0).x.size(), 0u);
   std::filesystem::resize_file(path_, 700);
-  const std::string error = errorOf([&] { allNodes(*grid, 0); });
-  EXPECT_NE(error.find(GetParam() == CgnsFileType::kHdf5 ? path_.string() : linking.string()),
-            std::string::npos)
-      << error;
+  EXPECT_NE(errorOf([&] { allNodes(*grid, 0); }).find(linking.string()), std::string::npos);
   std::vector<std::string> warnings;
   files.warn(warnings);
   ASSERT_EQ(warnings.size(), 1u);

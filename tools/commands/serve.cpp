@@ -98,7 +98,7 @@ void addServe(CLI::App& app) {
   CLI::App* command = app.add_subcommand("serve", "Show caches in a web browser");
   command->add_option("CACHE", arguments->caches, "Splat caches, directories NAME.splats")->required();
   command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")
-      ->check(CLI::Range(0, 65535))
+      ->check(CLI::Range(0u, 65535u))
       ->capture_default_str();
   command
       ->add_option("--listen", arguments->listen,
