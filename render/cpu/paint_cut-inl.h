@@ -164,6 +164,7 @@ HWY_INLINE Left leftIn(const BlockFaces& faces, Corner corner) {
 struct CutShade {
   Shade whole;
   float per_deviation;
+  bool fitted;  // by a parabola
 };
 
 /// Blends what is left of a splat that is cut over a block: values_at(pixels, the interval that is left, its share, out).
@@ -186,13 +187,13 @@ HWY_INLINE void blendCut(const Ellipse& e, const Cuts& cuts, const float* HWY_RE
 
 /// The same by one parabola, or one colour.
 HWY_INLINE void blendCut(const Ellipse& e, const Cuts& cuts, const float* HWY_RESTRICT footprint,
-                         Corner corner, const CutShade& cut_shade, bool fitted, BlockColours& colours) {
+                         Corner corner, const CutShade& cut_shade, BlockColours& colours) {
   const Floats d;
   blendCut(
       e, cuts, footprint, corner,
       [&](const Pixels& pixels, const Interval& left, V share, V(&value)[4]) HWY_ATTR {
         const Shade& shade = cut_shade.whole;
-        if (!fitted) return shade.valuesAt<false>(pixels, value);
+        if (!cut_shade.fitted) return shade.valuesAt<false>(pixels, value);
         if (cut_shade.per_deviation == 0) return shade.valuesAt<true>(pixels, value);
         const V s = hn::MulAdd(left.mean(share), hn::Set(d, cut_shade.per_deviation), shade.s.at(pixels));
         for (int c = 0; c < 4; ++c)
@@ -322,7 +323,8 @@ HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number,
       work.table.logScale() && work.shading.per_pixel && narrower ? kOther : static_cast<Fit>(visit.fit());
   if (out.fit == kOther) return;
   const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
-  out.shade = {shadeOf(visit.fits, visit.n), inverse * out.faces.mean_per_deviation * ScreenCut::kReach};
+  out.shade = {shadeOf(visit.fits, visit.n), inverse * out.faces.mean_per_deviation * ScreenCut::kReach,
+               out.fit == kParabola};
   out.shade.whole.s = narrower
                           ? Along{0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq}
                           : along(visit.all.pieces, visit.n, scalar, -1, 1);
@@ -343,10 +345,8 @@ HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float
 HWY_INLINE void blendFitted(const CutSplat& cut, const float* footprint, int block, BlockColours& colours) {
   const Corner corner = cornerOf(block);
   const Left left = leftIn(cut.block_faces, corner);
-  const bool by_parabola = cut.fit == kParabola;
-  if (left == Left::kAll) blendOver(cut.e, footprint, corner, cut.shade.whole, by_parabola, colours);
-  if (left == Left::kSome)
-    blendCut(cut.e, {cut.faces, cut.line, {}}, footprint, corner, cut.shade, by_parabola, colours);
+  if (left == Left::kAll) blendOver(cut.e, footprint, corner, cut.shade.whole, cut.shade.fitted, colours);
+  if (left == Left::kSome) blendCut(cut.e, {cut.faces, cut.line, {}}, footprint, corner, cut.shade, colours);
 }
 
 /// The same of one that has lines. The depths that are left do not move its scalar.
@@ -375,9 +375,8 @@ HWY_NOINLINE bool paintWindowed(const TileWork& work, const CutSplat& cut, const
   return paintWindows(work, block, [&](float* at, const DepthWindow& window) HWY_ATTR {
     const Cuts cuts{cut.faces, cut.line, window};
     if (cut.fit != kOther)
-      return paintBlock(at, [&](BlockColours& colours) HWY_ATTR {
-        blendCut(cut.e, cuts, footprint, corner, cut.shade, cut.fit == kParabola, colours);
-      });
+      return paintBlock(at, [&](BlockColours& colours)
+                                HWY_ATTR { blendCut(cut.e, cuts, footprint, corner, cut.shade, colours); });
     LookedUp looked_up;
     return lookUpBlock(cut.e, cut.scalar, cuts, {work.table, footprint}, corner, looked_up) &&
            paintLookedUp(looked_up, cut.lit, at);

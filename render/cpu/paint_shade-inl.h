@@ -1,5 +1,5 @@
-// Applies the transfer function to a splat's pixels, over a piece of the splat: a colour, a parabola along
-// the scalar's slope, or every pixel for itself. Included once for every instruction set.
+// Applies the transfer function to a splat's pixels, over a piece of the splat: a colour, a parabola or lines
+// along the scalar's slope, or every pixel for itself. Included once for every instruction set.
 #if defined(CURVISPLAT_PAINT_SHADE_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef CURVISPLAT_PAINT_SHADE_INL_H
 #undef CURVISPLAT_PAINT_SHADE_INL_H
@@ -283,7 +283,7 @@ struct Knots {
   float error;  // of the lines from knot to knot, at the most
   float most;   // extinction
 
-  /// Over a move by h cells a line is off by at most h min(h / 2w / 8, 1/4) times the sum of |second differences|
+  /// Computes them. A line over a move by h cells is off by at most h min(h / 2w / 8, 1/4) times the sum of |second differences|
   /// (ShadingTable); and on a logarithmic scale, where the move itself is bent, by an eighth of r (of twice that, since
   /// r <= 0.3 changes within the move) times the largest slope.
   HWY_INLINE void set(const ShadingTable& table, const Moving& moving) {

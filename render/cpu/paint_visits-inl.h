@@ -381,6 +381,7 @@ HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
     shade.by[c] = fits.by.of[c].at[n];
     shade.bend[c] = fits.bend.of[c].at[n];
   }
+  shade.s = {};
   return shade;
 }
 
