@@ -325,6 +325,17 @@ glm::dvec3 roundedPlace(const glm::dvec3& place, double scale) {
   return rounded;
 }
 
+/// The view along the axis of `view`, "+x", "+y" or "+z", from the side from which more is seen: the deep end of an ocean's column
+/// is not what one looks for.
+std::string betterSide(const DrawnSamples& drawn, const std::string& view) {
+  const FewSamples few(drawn.samples, drawn.depths);
+  const auto worth = [&](const std::string& from) {
+    return rareSeen(few, Camera::named(from, drawn.lower, drawn.upper, {1, 1}, Projection::kOrthographic));
+  };
+  const std::string other = "-" + view.substr(1);
+  return worth(other) > (other == "-z" ? kPreferAbove : kPreferFirst) * worth(view) ? other : view;
+}
+
 ViewChoice alongAxis(const CoarseSamples& samples, const std::vector<double>& depths, ViewChoice choice,
                      const Camera& whole, double aspect) {
   const SeenSamples seen(samples, whole);
@@ -368,6 +379,7 @@ ViewChoice chooseView(const DrawnSamples& drawn, ImageSize size, Framed framed) 
   const double total = std::accumulate(depths.begin(), depths.end(), 0.0);
   if (!(total > 0)) return choice;
   if (widest.view != "iso") {
+    choice.view = betterSide(drawn, choice.view);
     if (framed == Framed::kBox) return choice;
     const Camera whole = Camera::named(choice.view, lower, upper, size, Projection::kOrthographic);
     return alongAxis(samples, depths, choice, whole, aspect);

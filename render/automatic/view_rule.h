@@ -56,8 +56,8 @@ struct DrawnSamples {
   glm::dvec3 lower, upper;  // the data's box
 };
 
-/// The view for a picture of `size`: along an axis if the widest silhouette is, else in perspective from that of eight
-/// oblique sides from which most of what the function makes opaque is seen.
+/// The view for a picture of `size`: along an axis, from either side, if the widest silhouette is, else in perspective from that of
+/// eight oblique sides from which most of what the function makes opaque is seen.
 ViewChoice chooseView(const DrawnSamples& drawn, ImageSize size, Framed framed);
 
 }  // namespace curvisplat

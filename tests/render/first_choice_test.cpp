@@ -12,6 +12,7 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <string_view>
 
 #include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
@@ -208,6 +209,38 @@ TEST(FirstChoice, LooksFromWhereRareValuesAreSeen) {
     EXPECT_GT(reach, 0.85);
     EXPECT_LT(reach, 0.9);
   }
+}
+
+/// A plate across each axis, dense on one of its sides: that side is looked at, but for one below that is only a little denser.
+TEST(FirstChoice, LooksAtTheDenseSideOfAPlate) {
+  static constexpr std::string_view kAcross[] = {"+x", "+y", "+z"};
+  const auto chosen = [](int axis, bool upper_side, double factor) {
+    CoarseSamples samples;
+    std::vector<double> depths;
+    constexpr int kAlong = 60;
+    for (int n = 0; n < 4 * kAlong * kAlong; ++n) {
+      glm::dvec3 place;
+      place[axis] = 0.01 * (n % 4);
+      place[(axis + 1) % 3] = n / 4 % kAlong / double{kAlong};
+      place[(axis + 2) % 3] = n / 4 / kAlong / double{kAlong};
+      const double volume = 0.01 / (kAlong * kAlong);
+      add(samples, 1, volume);
+      samples.positions.back() = place;
+      depths.push_back(volume * 100 * ((n % 4 >= 2) == upper_side ? factor : 1));
+    }
+    const glm::dvec3 lower(0);
+    glm::dvec3 upper(1);
+    upper[axis] = 0.04;
+    const Silhouette widest{kAcross[axis], 1};
+    return chooseView({samples, depths, widest, lower, upper}, {300, 200}, Framed::kSeen).view;
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name(1, "xyz"[axis]);
+    EXPECT_EQ(chosen(axis, true, 10), "+" + name);
+    EXPECT_EQ(chosen(axis, false, 10), "-" + name);
+    EXPECT_EQ(chosen(axis, false, 1), "+" + name);
+  }
+  EXPECT_EQ(chosen(2, false, 1.2), "+z");
 }
 
 TEST(FirstChoice, ConstantScalarsAreRecognised) {
