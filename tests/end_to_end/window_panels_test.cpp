@@ -325,6 +325,42 @@ TEST_F(WindowPanels, WhatTheMenuAddsIsUnfolded) {
   close();
 }
 
+/// All that can be listed is as wide as the panels at most.
+TEST_F(WindowPanels, NothingIsCutOffAtThePanelsEdge) {
+  open({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);
+  save();
+  const int end = placeOf("scalar", 1).first + 1, wide_end = placeOf("picture", 0).first;
+  const std::pair<const char*, Words> tabs[] = {
+      {"Colour", {"gradient opacity", "colour points", "opacity points"}},
+      {"Objects", {"Markers", "Clip box", "Clip planes"}},
+      {"View", {"Statistics", "Detail and memory", "Film"}}};
+  for (const auto& [name, sections] : tabs) {
+    tab(name);
+    for (const std::string& section : sections) {  // from below, so that those to come stay where they are
+      click(section);
+      save();
+    }
+    if (name == std::string("View")) {
+      click("add key frame");
+      placeOf("film time");
+    }
+    std::ifstream file("widgets");
+    for (std::string line; std::getline(file, line);) {
+      std::istringstream words(line);
+      int x = 0, y = 0, width = 0, height = 0;
+      std::string widget;
+      words >> x >> y >> width >> height;
+      std::getline(words >> std::ws, widget);
+      const bool below =
+          widget.starts_with("Save picture") || widget.starts_with("Save film: once") ||
+          widget.starts_with("Copy command for this");  // the list, with no space for a scroll bar
+      if (x >= end || widget.starts_with("menu ")) continue;
+      EXPECT_LE(x + width, below ? wide_end : end) << widget;
+    }
+  }
+  close();
+}
+
 TEST_F(WindowPanels, EscapeClosesListsAndMenus) {
   open();
   click("scalar");

@@ -64,7 +64,6 @@ void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelAc
   ImGui::SameLine();
   does.save |= button("Save keys...", "save film", has_keys,
                       "the key frames, for render --path and for the next time");
-  ImGui::SameLine();
   ImGui::BeginDisabled(!has_keys);
   commandButton(Command::kSaveFilmMovie, actions, "Save film...");
   ImGui::SameLine();

@@ -41,10 +41,10 @@ class TypedNumbers {
 /// changed. `label` is Dear ImGui's.
 bool colourSwatch(const char* label, float* rgb, const std::string& name);
 
-/// The two ends of a range that are dragged: how far per pixel, the ends of both, and printf's formats.
 /// Whether the widget that was drawn last is held, and not a field into which a number is typed.
 bool isDragged();
 
+/// The two ends of a range that are dragged: how far per pixel, the ends of both, and printf's formats.
 struct DraggedEnds {
   float speed, lowest, highest;
   const char *low_format, *high_format;
