@@ -149,6 +149,11 @@ def is_the_commands_picture(tab, server_caches):
 def navigation(browser, server, caches):
     tab = opened(browser, server.url)
     shot(tab, "first")
+    waiting = "getComputedStyle(document.getElementById('stage'), '::before').content"
+    expect("waiting" not in tab.run(waiting), "a page with a picture waits for none")
+    tab.run("document.getElementById('stage').className = ''")
+    expect("waiting for the first picture" in tab.run(waiting), "a page without a picture says that it waits")
+    tab.run("document.getElementById('stage').className = 'drawn'")
     is_the_commands_picture(tab, caches)
     tab.run("document.getElementById('picture').focus()")
     changes(tab, lambda: tab.key("o"), "the key o")
@@ -780,6 +785,12 @@ def phone(browser, server):
     tab.run("document.getElementById('panel').scrollTop = 330")
     shot(tab, "phone_scrolled")
     # Its whole label switches a box.
+    tab.run("document.getElementById('keys').showModal()")
+    wide_columns = tab.run("""[...document.querySelectorAll('#keys td')].map(e => e.getBoundingClientRect().width)
+      .every(width => width > 0.3 * document.getElementById('keys').clientWidth)""")
+    expect(wide_columns, "keys and what they do both have space")
+    shot(tab, "phone_keys")
+    tab.run("document.getElementById('keys').close()")
     before = tab.run("document.getElementById('outline').checked")
     tab.run("document.getElementById('outline').closest('label').click()")
     expect(tab.run("document.getElementById('outline').checked") != before, "a label switches its box")
