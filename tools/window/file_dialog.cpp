@@ -214,7 +214,12 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
   if (accepts) chosen = accept();
-  if (chosen && chosen->purpose == Purpose::kOpenData) data_folder_ = chosen->files.front().parent_path();
+  if (chosen) {
+    std::error_code ignored;
+    const fs::path from = chosen->files.front().parent_path();
+    if (fs::is_directory(from, ignored)) folder_ = from;  // offered the next time, as where a path was typed
+    if (chosen->purpose == Purpose::kOpenData) data_folder_ = from;
+  }
   if (cancels || chosen) {
     ImGui::CloseCurrentPopup();
     purpose_.reset();
@@ -406,7 +411,6 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
       return std::nullopt;
     }
     chosen.files.push_back(path);
-    if (fs::is_directory(path.parent_path(), ignored)) folder_ = path.parent_path();  // offered the next time
     if (*purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie) chosen.size = size_;
     if (*purpose_ == Purpose::kSaveMovie) chosen.frames_per_s = movie_.frames_per_s;
     return chosen;
