@@ -116,6 +116,8 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   openDialog("twice.png");
   clickUntil("picture size Twice that",
              [&] { return hasWidget(fmt::format("picture of {} x {}", 2 * shown.width, 2 * shown.height)); });
+  press("Return");  // it is the button's where the keyboard is in no field
+  ASSERT_TRUE(eventually([] { return !isOpen(); }, kLong));
   const Image twice = accept("twice.png");
   EXPECT_EQ(twice.size.width, 2 * shown.width);
   EXPECT_EQ(twice.size.height, 2 * shown.height);

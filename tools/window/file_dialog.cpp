@@ -13,6 +13,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/text.h"
+#include "tools/window/keyboard_focus.h"
 #include "tools/window/widgets.h"
 
 namespace curvisplat {
@@ -182,6 +183,9 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   help_ ? drawHelp(look.saves) : drawEntries(accepts);
   ImGui::SetNextItemWidth(-1);
   if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
+  // Where no widget has the keyboard, Return is the button's.
+  accepts |= ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Enter), false) && !ImGui::IsAnyItemActive() &&
+             !keyboardFocus().isShown();
   accepts |= ImGui::InputTextWithHint("##name", look.saves ? "name" : "name, or a path", &name_,
                                       ImGuiInputTextFlags_EnterReturnsTrue);
   nameWidget("file name");
