@@ -436,6 +436,22 @@ TEST_F(FurtherScalarTest, OneIsAddedForAnIsosurface) {
   expectDraws(commands[0], drawn);
 }
 
+TEST_F(FurtherScalarTest, OneIsAddedForTheColoursOfFaces) {
+  open({"--surface", "kmin"});
+  tab("Objects");
+  click("surfaces by");
+  click("surfaces by further volume");
+  ASSERT_TRUE(eventually([] { return hasWidget("surfaces show: volume"); }, 300));
+  ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
+  moveTo(rest_);
+  const Image drawn = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--scalar"), "f");
+  EXPECT_EQ(valueOf(commands[0], "--surface-by"), "volume");
+  expectDraws(commands[0], drawn);
+}
+
 /// The list of isosurfaces may change while the scalar is being added.
 TEST_F(FurtherScalarTest, OneIsAddedForTheIsosurfaceItWasChosenFor) {
   open({"--iso", "0.3,0.6,0.8"});

@@ -385,7 +385,9 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
              "range and opacities chosen from the data; a colour map that you chose stays");
   const float gap = ImGui::GetStyle().ItemInnerSpacing.x;  // four of them fill the line
   ImGui::SameLine(0, gap);
-  if (button("ramp", "Ramp", "the colour map with its own opacities, which rise with the values")) {
+  if (button(
+          "ramp", "Ramp",
+          "the colour map with its own opacities: rising with the values, or on both sides of its middle")) {
     const std::string name = function.map().empty() ? kMapsOnDark.sequential : function.map();
     const bool log_scale = function.logScale();
     function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());

@@ -281,13 +281,13 @@ void CutPanel::drawSliceOpacity(ViewState& state, PanelActions& actions) {
 void SurfacePanel::draw(ViewState& state, const std::vector<std::string>& faces,
                         const FurtherScalars* further, PanelActions& actions) {
   if (const Section open{"Surfaces", surfaces_seen_, state.surfaces.size() + state.faces.size()})
-    drawSurfaces(state, faces, actions);
+    drawSurfaces(state, faces, further, actions);
   if (const Section open{"Isosurfaces", isosurfaces_seen_, state.isosurfaces.size()})
     drawIsosurfaces(state, further, actions);
 }
 
 void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>& faces,
-                                PanelActions& actions) {
+                                const FurtherScalars* further, PanelActions& actions) {
   const bool is_full = state.surfaces.size() + state.faces.size() >= kMaxSurfaces;
   label("add wall or face");
   ImGui::BeginDisabled(faces.empty() || is_full);
@@ -308,7 +308,7 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
   commandButton(Command::kAddSurfaceFile, actions, "Add from a file...");
   ImGui::EndDisabled();
   hint("STL, PLY or OBJ");
-  drawColouring(state, actions);
+  drawColouring(state, further, actions);
 
   size_t removed = state.faces.size();
   for (size_t n = 0; n < state.faces.size(); ++n) {
@@ -345,7 +345,8 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
 }
 
 /// Draws the choice of a colour for the faces of the grid; a file's have no scalar.
-void SurfacePanel::drawColouring(const ViewState& state, PanelActions& actions) {
+void SurfacePanel::drawColouring(const ViewState& state, const FurtherScalars* further,
+                                 PanelActions& actions) const {
   constexpr const char* kOwn = "a colour of its own";
   label("faces coloured by");
   ImGui::BeginDisabled(state.faces.empty());
@@ -358,9 +359,11 @@ void SurfacePanel::drawColouring(const ViewState& state, PanelActions& actions) 
       if (ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen)) actions.colour_faces = one.name;
       nameWidget("surfaces by " + one.name);
     }
+    if (further) drawFurther(*further, {"", false, std::nullopt, true}, "surfaces by further ", actions);
     ImGui::EndCombo();
   } else {
     nameWidget("surfaces by");
+    if (state.faces_by) nameWidget("surfaces show: " + state.faces_by->variable);
   }
   ImGui::EndDisabled();
 }

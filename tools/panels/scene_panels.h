@@ -45,8 +45,9 @@ class SurfacePanel {
             PanelActions& actions);
 
  private:
-  void drawSurfaces(ViewState& state, const std::vector<std::string>& faces, PanelActions& actions);
-  void drawColouring(const ViewState& state, PanelActions& actions);
+  void drawSurfaces(ViewState& state, const std::vector<std::string>& faces, const FurtherScalars* further,
+                    PanelActions& actions);
+  void drawColouring(const ViewState& state, const FurtherScalars* further, PanelActions& actions) const;
   void drawIsosurfaces(ViewState& state, const FurtherScalars* further, PanelActions& actions);
   void chooseScalarOf(size_t number, const Isosurface& one, const FurtherScalars* further,
                       PanelActions& actions) const;

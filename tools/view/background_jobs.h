@@ -50,9 +50,10 @@ struct WantedScalar {
   std::string name;
   bool for_opacities = false;                         // of the scalar that is shown
   std::optional<uint64_t> isosurface = std::nullopt;  // for the one with this Isosurface::id
+  bool for_faces = false;                             // for their colours
 
   /// Whether it is to be shown itself.
-  bool isShown() const { return !for_opacities && !isosurface; }
+  bool isShown() const { return !for_opacities && !isosurface && !for_faces; }
 };
 
 /// The functions of conversion that the window needs. The functions run on threads of their own, except for

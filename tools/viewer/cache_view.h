@@ -78,7 +78,7 @@ class CacheView {
   void showScalar(const std::string& name);
   /// An empty name: the opacities are of the same scalar.
   void chooseOpacityScalar(const std::string& name);
-  /// Takes a scalar that was added for the opacities or an isosurface; says if the cache that is shown does not have it.
+  /// Takes a scalar that was added for the opacities, faces or an isosurface; says if the cache that is shown does not have it.
   void useScalar(const WantedScalar& wanted);
   void use(const FileDialog::Chosen& chosen);
   void addTo(MenuFacts& facts);

@@ -472,6 +472,7 @@ void CacheView::useScalar(const WantedScalar& wanted) {
     return say(
         fmt::format("{} has values at other samples: it is drawn by itself, as the scalar.", wanted.name));
   if (wanted.for_opacities) return chooseOpacityScalar(wanted.name);
+  if (wanted.for_faces) return colourFaces(wanted.name);
   findIsosurface(wanted.name, wanted.isosurface);
 }
 
