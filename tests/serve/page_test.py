@@ -791,6 +791,12 @@ def phone(browser, server):
     shot(tab, "phone_keys")
     tab.run("document.getElementById('keys').close()")
     # Its whole label switches a box.
+    tab.run("document.getElementById('keys').showModal()")
+    wide_columns = tab.run("""[...document.querySelectorAll('#keys td')].map(e => e.getBoundingClientRect().width)
+      .every(width => width > 0.3 * document.getElementById('keys').clientWidth)""")
+    expect(wide_columns, "keys and what they do both have space")
+    shot(tab, "phone_keys")
+    tab.run("document.getElementById('keys').close()")
     before = tab.run("document.getElementById('outline').checked")
     tab.run("document.getElementById('outline').closest('label').click()")
     expect(tab.run("document.getElementById('outline').checked") != before, "a label switches its box")
