@@ -311,7 +311,7 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
     e.half_width = cell.half_width;
     e.along = cell.along * left.x;
     correlation = 0.0;
-  } else {
+  } else if (!across) {
     e.along *= left.x * left.y;
   }
   e.amplitude *= s.opacity;
@@ -326,7 +326,7 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
       w = vec3(dot(w, inFrameOf(s.piece, a[0])), dot(w, inFrameOf(s.piece, a[1])), dot(w, inFrameOf(s.piece, a[2])));
     }
     Ellipse of_colour = ellipseOf(ray.b0, ray.b1, w, s.colour_variance, 1.0);
-    of_colour.along *= left.x * left.y;
+    if (!across) of_colour.along *= left.x * left.y;
     float with_depth = across ? correlationOf(ray, w, of_colour.half_width, depth_steepness)
                               : faces ? correlationOf(ray, w, of_colour.half_width, steepest(cut)) : 0.0;
     own -= 4u;

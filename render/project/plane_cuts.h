@@ -96,8 +96,8 @@ struct DepthsLeft {
   static DepthsLeft atCentre(const ScreenCut& cut);
 };
 
-/// Returns `along` of a splat that is cut: what is left hides less of itself, by both its depths and its optical depth. Painters
-/// take the optical depth of all of it.
+/// Returns `along` of a splat that is cut at faces alone: what is left hides less of itself, by both its depths and its optical
+/// depth. Painters take the optical depth of all of it. Where it meets layers, they take what each window leaves.
 inline float alongLeft(const Ellipse& ellipse, const ScreenCut& cut) {
   const DepthsLeft left = DepthsLeft::atCentre(cut);
   return ellipse.along * left.share * left.deviation;

@@ -228,7 +228,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
       const Ellipse cell = ellipseOf(at.rows, whole.shape, whole.slope, variable.variance[i],
                                      whole.weight * at.volume, map.low_pass);
       keepScalarOf(cell, whole.mean, x, y, splat, cut);
-    } else if (faces) {
+    } else if (faces && !across) {
       splat.along = alongLeft(ellipse, cut);
     }
     ScreenDepth along_ray;

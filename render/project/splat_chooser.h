@@ -223,7 +223,7 @@ ScreenColour colourOf(const Map& map, const PlacedPiece& at, const SplatPiece& p
     ScreenCut cut;
     cutAtFaces(at.rows, piece, e, map.low_pass.footprint_px2, cut);
     colour.correlation = cut.correlation;
-    colour.along = alongLeft(e, cut);
+    if (!across) colour.along = alongLeft(e, cut);
   }
   if (across)
     colour.correlation =
