@@ -28,6 +28,8 @@ struct ColourVisits {
   Row tp, tq;
   Row slope_reach;  // of the slope alone; that of `pieces` has what cuts move the mean by as well
   Row correlation;
+  Row mean, half_width, along,
+      tau;  // of the whole splat, and what it hides of itself; `pieces` have what is seen
   Pieces pieces;
   Fits fits{};
 
@@ -52,7 +54,7 @@ HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const 
     store(one, out.pieces.to);
     if (!work.shading.per_pixel) {
       store(mean, out.pieces.mean);
-      for (Row* row : {&out.tp, &out.tq, &out.slope_reach, &out.correlation, &out.pieces.reach,
+      for (Row* row : {&out.tp, &out.tq, &out.slope_reach, &out.correlation, &out.pieces.reach, &out.along,
                        &out.pieces.half_width, &out.pieces.width_loss})
         store(zero, *row);
       continue;
@@ -65,6 +67,10 @@ HWY_INLINE void setUpColours(const TileWork& work, const IntRow& numbers, const 
     const auto hides =
         hn::Gt(hn::Mul(hn::Abs(nearer), cellsAScalar(*work.colours, mean)), hn::Set(d, kHidingCells));
     store(hn::IfThenElse(hides, hn::Sub(mean, nearer), mean), out.pieces.mean);
+    store(mean, out.mean);
+    store(all, out.half_width);
+    store(hn::IfThenElseZero(hides, along), out.along);
+    store(tau, out.tau);
     const V lost = hn::Mul(hn::Mul(hn::Set(d, 3.0f), hn::Mul(along, along)), lostByHiding(tau, near_side));
     const V narrower = hn::Sqrt(hn::Max(hn::MulSub(all, all, lost), zero));
     const V half_width = hn::IfThenElse(hides, narrower, all);
@@ -103,6 +109,7 @@ struct Channel {
   Scalar scalar;             // with the reach of the slope alone
   float mean_per_deviation;  // as that of Faces
   bool looked_up;
+  Hiding hiding;            // by windows
   Shade shade;              // else; s is 0 at the mean
   float per_deviation;      // of s
   int first = 0, last = 3;  // of the table's values
@@ -116,6 +123,7 @@ HWY_INLINE Channel channelOf(const ShadingTable& table, const Fits& fits, size_t
                   scalar,
                   correlation * scalar.half_width * (1 / kSqrt3),
                   fits.fit.at[n] == kOther,
+                  {},
                   shadeOf(fits, n),
                   0};
   const float inverse = 1 / std::max(piece_reach, 1e-37f);
@@ -128,7 +136,7 @@ HWY_INLINE Channel channelOf(const ShadingTable& table, const Fits& fits, size_t
 
 /// The rest of some pixels along the ray: moments as those of an Interval.
 struct Remaining {
-  V mean, lost_variance;
+  V share, mean, lost_variance;
 };
 
 HWY_INLINE void evaluate(Channel& channel, const Pixels& pixels, const Remaining& left, size_t lane,
@@ -137,11 +145,17 @@ HWY_INLINE void evaluate(Channel& channel, const Pixels& pixels, const Remaining
   if (channel.looked_up) {
     const Scalar& scalar = channel.scalar;
     const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
-    const V mean = hn::MulAdd(hn::Set(d, channel.mean_per_deviation * ScreenCut::kReach), left.mean,
-                              hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)));
+    V mean = hn::MulAdd(hn::Set(d, channel.mean_per_deviation * ScreenCut::kReach), left.mean,
+                        hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)));
     const float lost = 3 * channel.mean_per_deviation * channel.mean_per_deviation;
-    const V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lost_variance,
-                                   hn::Set(d, scalar.half_width * scalar.half_width));
+    V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lost_variance,
+                             hn::Set(d, scalar.half_width * scalar.half_width));
+    if (channel.hiding.along != 0) {
+      V nearer, narrower;
+      channel.hiding.of(left.share, left.lost_variance, nearer, narrower);
+      mean = hn::Sub(mean, nearer);
+      width2 = hn::Sub(width2, narrower);
+    }
     locate(channel.table, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, channel.pixels.scale.at + lane);
     return;
@@ -183,11 +197,12 @@ HWY_NOINLINE bool paintBlock(Coloured& splat, const DepthWindow& window, const f
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(splat.e, corner, lane);
     V depth = depthAt(splat.e, footprint, pixels);
-    Remaining left{hn::Zero(d), hn::Zero(d)};
+    Remaining left{hn::Set(d, 1.0f), hn::Zero(d), hn::Zero(d)};
     if (splat.is_cut) {
       const Interval interval = intervalAt(cuts, pixels, lane);
       const V share = interval.share();
       depth = hn::Mul(depth, share);
+      left.share = share;
       left.mean = interval.mean(share);
       left.lost_variance = interval.lostVariance(share, left.mean);
     }
@@ -232,14 +247,24 @@ HWY_NOINLINE BlockMask paintColoured(const TileWork& work, BlockMask blocks, con
     correlation = ScreenDepth::of(*records.depth).correlation;
   else if (records.cut)
     correlation = ScreenCut::of(*records.cut).correlation;
+  const ColourVisits& colours = at.colours;
+  Scalar of_colour = colours.scalar(n);
+  Hiding hiding;
+  if (records.depth && colours.along.at[n] != 0) {
+    of_colour.mean = colours.mean.at[n];
+    of_colour.half_width = colours.half_width.at[n];
+    hiding = {colours.along.at[n], colours.tau.at[n]};
+  }
   Coloured splat{at.visits.ellipse(n),
                  facesOf(records.cut),
                  depthLineOf(records.depth),
                  records.cut || records.depth,
                  at.visits.lit(work, n),
                  channelOf(work.table, at.fits, n, scalar, correlation, piece_reach),
-                 channelOf(*work.colours, at.colours.fits, n, at.colours.scalar(n),
-                           at.colours.correlation.at[n], at.colours.pieces.reach.at[n])};
+                 channelOf(*work.colours, colours.fits, n, of_colour, colours.correlation.at[n],
+                           colours.pieces.reach.at[n])};
+  splat.colour.hiding = hiding;
+  splat.colour.looked_up |= hiding.along != 0;
   splat.opacity.first = 3;
   splat.colour.last = 2;
   const float from = at.visits.pieces.from.at[n], to = at.visits.pieces.to.at[n];

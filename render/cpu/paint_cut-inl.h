@@ -108,11 +108,27 @@ struct DepthWindow {
   const float* HWY_RESTRICT farther = nullptr;
 };
 
+/// Holds what a splat hides of itself where that depends on what is left of it in each window: its `along`, and the
+/// optical depth of its cell.
+struct Hiding {
+  float along = 0, tau = 0;
+
+  /// How much nearer the scalar is seen, and by how much less the square of its half width is.
+  HWY_INLINE void of(V share, V lost_variance, V& nearer, V& lost) const {
+    const Floats d;
+    const V left = hn::Mul(share, hn::Set(d, tau)), side = nearSide(left);
+    const V kept = hn::Sub(hn::Set(d, 1.0f), lost_variance);
+    nearer = hn::Mul(hn::Mul(hn::Set(d, kSqrt3 * along), hn::Sqrt(kept)), side);
+    lost = hn::Mul(hn::Mul(hn::Set(d, 3 * along * along), kept), lostByHiding(left, side));
+  }
+};
+
 /// The cuts of a splat in a block.
 struct Cuts {
   const Faces& faces;
   const DepthLine& depth;
   DepthWindow window;
+  Hiding hiding = {};
 };
 
 HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t lane) {
@@ -210,7 +226,7 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
   const float* HWY_RESTRICT footprint = tables.footprint;
   const Faces& faces = cuts.faces;
   Intervals intervals, nearer;
-  const bool hides = scalar.nearer != 0;
+  const bool hides = scalar.nearer != 0, by_window = cuts.hiding.along != 0;
   const float hidden2 =
       scalar.half_width * scalar.half_width - scalar.seen_half_width * scalar.seen_half_width;
   out.touched = 0;
@@ -226,19 +242,21 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
     hn::Store(depth, d, out.depth.at + lane);
     V mean = hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean));
     V half_width = hn::Set(d, scalar.half_width), seen_half_width = hn::Set(d, scalar.seen_half_width);
-    if (faces.mean_per_deviation != 0) {
-      const V moved = left.mean(share);
+    V by = hn::Set(d, scalar.nearer);
+    if (faces.mean_per_deviation != 0 || by_window) {
+      const V moved = left.mean(share), lost_variance = left.lostVariance(share, moved);
       mean = hn::MulAdd(hn::Set(d, faces.mean_per_deviation * ScreenCut::kReach), moved, mean);
       const float lost = 3 * faces.mean_per_deviation * faces.mean_per_deviation;
-      const V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lostVariance(share, moved),
-                                     hn::Set(d, scalar.half_width * scalar.half_width));
+      const V width2 =
+          hn::NegMulAdd(hn::Set(d, lost), lost_variance, hn::Set(d, scalar.half_width * scalar.half_width));
+      V narrower = hn::Set(d, hidden2);
+      if (by_window) cuts.hiding.of(share, lost_variance, by, narrower);
       half_width = hn::Sqrt(hn::Max(width2, hn::Zero(d)));
-      seen_half_width = hn::Sqrt(hn::Max(hn::Sub(width2, hn::Set(d, hidden2)), hn::Zero(d)));
+      seen_half_width = hn::Sqrt(hn::Max(hn::Sub(width2, narrower), hn::Zero(d)));
     }
     locate(tables.shading, mean, half_width, lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
-    if (hides)
-      locate(tables.shading, hn::Sub(mean, hn::Set(d, scalar.nearer)), seen_half_width, lane, nearer);
+    if (hides) locate(tables.shading, hn::Sub(mean, by), seen_half_width, lane, nearer);
   }
   if (out.touched == 0) return false;
   out.integrate(tables.shading, intervals);
@@ -295,6 +313,7 @@ struct CutSplat {
   BlockFaces block_faces;
   DepthLine line;
   CutShade shade;
+  Hiding hiding;
   Lit lit;
   Fit fit;        // kOther: every pixel is looked up
   bool windowed;  // it is painted in each window of its pixels
@@ -319,8 +338,12 @@ HWY_INLINE void makeCut(const TileWork& work, const Visit& visit, size_t number,
     scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
   // On a logarithmic scale there is no bound of what a narrower distribution sees.
   const bool narrower = out.faces.mean_per_deviation != 0;
-  out.fit =
-      work.table.logScale() && work.shading.per_pixel && narrower ? kOther : static_cast<Fit>(visit.fit());
+  const bool hides = records.depth && scalar.nearer != 0;
+  out.fit = hides || (work.table.logScale() && work.shading.per_pixel && narrower)
+                ? kOther
+                : static_cast<Fit>(visit.fit());
+  out.hiding = {};
+  if (hides) out.hiding = {splat.along, visit.all.cell_depth.at[visit.n] * visit.fits.at.of[3].at[visit.n]};
   if (out.fit == kOther) return;
   const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
   out.shade = {shadeOf(visit.fits, visit.n), inverse * out.faces.mean_per_deviation * ScreenCut::kReach,
@@ -338,7 +361,7 @@ HWY_INLINE bool lookUpCut(const TileWork& work, const CutSplat& cut, const float
   const Left left = leftIn(cut.block_faces, corner);
   if (left == Left::kNothing) return false;
   if (left == Left::kAll) return lookUpBlock(cut.e, cut.scalar, tables, corner, out);
-  return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}}, tables, corner, out);
+  return lookUpBlock(cut.e, cut.scalar, Cuts{cut.faces, cut.line, {}, cut.hiding}, tables, corner, out);
 }
 
 /// Blends a splat that is fitted, and not windowed, over a block.
@@ -373,7 +396,7 @@ HWY_NOINLINE bool paintWindowed(const TileWork& work, const CutSplat& cut, const
   const Corner corner = cornerOf(block);
   if (leftIn(cut.block_faces, corner) == Left::kNothing) return false;
   return paintWindows(work, block, [&](float* at, const DepthWindow& window) HWY_ATTR {
-    const Cuts cuts{cut.faces, cut.line, window};
+    const Cuts cuts{cut.faces, cut.line, window, cut.hiding};
     if (cut.fit != kOther)
       return paintBlock(at, [&](BlockColours& colours)
                                 HWY_ATTR { blendCut(cut.e, cuts, footprint, corner, cut.shade, colours); });
@@ -385,7 +408,8 @@ HWY_NOINLINE bool paintWindowed(const TileWork& work, const CutSplat& cut, const
 
 /// Whether lines may do for the splat.
 HWY_INLINE bool mayHaveLines(const Visit& visit, const CutSplat& cut) {
-  return cut.isLookedUp() && cut.faces.mean_per_deviation == 0 && mayHaveLines(visit);
+  return cut.isLookedUp() && cut.faces.mean_per_deviation == 0 && cut.hiding.along == 0 &&
+         mayHaveLines(visit);
 }
 
 /// Returns those of `blocks` that are saturated then.

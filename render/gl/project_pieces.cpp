@@ -196,6 +196,16 @@ vec2 leftAtCentre(Cut cut) {
   return vec2(left.x, sqrt(clamp(7.0 * (left.z / left.x - mean * mean), 0.0, 1.0)));
 }
 
+// This is shareOfAlong() in plane_cuts.h.
+float shareOfAlong(Ray ray, Piece piece) {
+  if ((piece.counts >> 24 & 1u) == 0u) return 1.0;
+  vec3 across = fourAt(piece.faces).xyz;
+  float facing = dot(ray.along, across), facing2 = facing * facing;
+  float tangent2 = (ray.nn * dot(across, across) - facing2) / facing2;
+  float share = 1.0 - PLATES_BEHIND * max(0.0, sqrt(max(0.0, tangent2) * ray.determinant / ray.nn) - PLATES_FROM);
+  return share > 0.0 ? share : 0.0;
+}
+
 float steepest(Cut cut) {
   return max(cut.steepness.x, max(cut.steepness.y, cut.steepness.z));
 }
@@ -291,6 +301,8 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
   Place at = placeOf(p, piece.position);
   Ray ray = rayOf(rowOf(at.row0, a), rowOf(at.row1, a));
   Ellipse e = ellipseOf(ray.b0, ray.b1, piece.w, s.variance, piece.weight * at.volume);
+  float share_of_along = shareOfAlong(ray, piece);
+  e.along *= share_of_along;
   uint side = sideOfLayers(p, at, e, a);
   if (side == kOutside) return 0u;
   Cut cut = cutOf(p, ray, e, a, piece, s.clipped);
@@ -311,7 +323,7 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
     e.half_width = cell.half_width;
     e.along = cell.along * left.x;
     correlation = 0.0;
-  } else {
+  } else if (!across) {
     e.along *= left.x * left.y;
   }
   e.amplitude *= s.opacity;
@@ -326,7 +338,7 @@ uint drawPiece(uint slot, uint room, uint p, Splat s, Piece piece, uint skew) {
       w = vec3(dot(w, inFrameOf(s.piece, a[0])), dot(w, inFrameOf(s.piece, a[1])), dot(w, inFrameOf(s.piece, a[2])));
     }
     Ellipse of_colour = ellipseOf(ray.b0, ray.b1, w, s.colour_variance, 1.0);
-    of_colour.along *= left.x * left.y;
+    of_colour.along *= across ? share_of_along : share_of_along * left.x * left.y;
     float with_depth = across ? correlationOf(ray, w, of_colour.half_width, depth_steepness)
                               : faces ? correlationOf(ray, w, of_colour.half_width, steepest(cut)) : 0.0;
     own -= 4u;
@@ -428,9 +440,11 @@ std::string pieceFunctions() {
       "#define NO_FACE {:.1f}\n#define CUT_TAG {:.1f}\n#define FAR_SIDES_TAG {:.1f}\n#define "
       "SUPPORT_AT_BORDER {:.9g}\n"
       "#define DEPTH_REACH {:.9g}\n#define DEPTH_TAG {:.1f}\n#define DEPTH_OF_CUT_TAG {:.1f}\n"
-      "#define COLOUR_TAG {:.1f}\n#define LAYER_CELL {}\n{}{}",
+      "#define COLOUR_TAG {:.1f}\n#define LAYER_CELL {}\n#define PLATES_BEHIND {:.9g}\n#define PLATES_FROM "
+      "{:.9g}\n{}{}",
       ScreenCut::kNoFace, kCutTag, kFarSidesTag, static_cast<float>(kKernelSupport + kMergedReach),
-      kDepthReach, kDepthTag, kDepthOfCutTag, kColourTag, PixelLayers::kCellSide, kFunctions, kDraw);
+      kDepthReach, kDepthTag, kDepthOfCutTag, kColourTag, PixelLayers::kCellSide, kPlatesBehind, kPlatesFrom,
+      kFunctions, kDraw);
 }
 
 }  // namespace curvisplat

@@ -229,18 +229,20 @@ vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
   if (amplitude < 0.0) left = remainder(u, lo, hi);
   float lost = amplitude < 0.0 ? 1.0 - clamp(7.0 * left.z, 0.0, 1.0) : 0.0;
   depth *= left.x;
+  // Splats that meet layers hide of themselves what is left in each window: a part of their optical depth, and of their depths.
+  vec2 hides = depth_line.w > 0.0 ? vec2(left.x, sqrt(1.0 - lost)) : vec2(1.0);
   vec2 ends = intervalOf(scalar, cut.y, u, vec2(left.y, lost), LOG_SCALE, cells_from_scalar);
   vec4 seen = max((integral(classes, ends.y, below, above) - integral(classes, ends.x, below, above)) / (ends.y - ends.x), 0.0);
 #if COLOURED
   vec2 middle = interval(scalar.x, PER_PIXEL ? scalar.w : 0.0, LOG_SCALE, cells_from_scalar);
   float of_middle = max((integral(classes, middle.y, below, above) - integral(classes, middle.x, below, above)).w / (middle.y - middle.x), 0.0);
-  vec4 near_colour = PER_PIXEL ? seenOf(colour, hiding.y, nearSide(hiding.z * of_middle)) : colour;
+  vec4 near_colour = PER_PIXEL ? seenOf(colour, hides.y * hiding.y, nearSide(hides.x * hiding.z * of_middle)) : colour;
   ends = intervalOf(near_colour, colour_correlation, u, vec2(left.y, lost), COLOUR_LOG_SCALE, cells_from_colour);
   seen.rgb = max((integral(colours, ends.y, colours_below, colours_above) -
                   integral(colours, ends.x, colours_below, colours_above)).rgb / (ends.y - ends.x), 0.0) * seen.w;
 #else
   if (PER_PIXEL && hiding.x != 0.0) {
-    vec4 near_scalar = seenOf(scalar, hiding.x, nearSide(hiding.z * seen.w));
+    vec4 near_scalar = seenOf(scalar, hides.y * hiding.x, nearSide(hides.x * hiding.z * seen.w));
     ends = intervalOf(near_scalar, cut.y, u, vec2(left.y, lost), LOG_SCALE, cells_from_scalar);
     vec4 near = max((integral(classes, ends.y, below, above) - integral(classes, ends.x, below, above)) / (ends.y - ends.x), 0.0);
     if (seen.w > 0.0) seen.rgb = (near.rgb + seen.rgb / 64.0) * (seen.w / (near.w + seen.w / 64.0));

@@ -35,6 +35,10 @@ StoredPiece storedPiece(const SplatPiece& piece) {
     out.faces[n] = {face.inward.x, face.inward.y, face.inward.z, face.distance};
     if (face.edge_on) out.counts |= 1u << (8 + n);
   }
+  if (piece.across != glm::vec3(0.0f)) {
+    out.counts |= 1u << 24;
+    out.faces[0] = {piece.across.x, piece.across.y, piece.across.z, 0};
+  }
   for (size_t n = 0; n < piece.growth.count; ++n) {
     const glm::vec3& along = piece.growth.along[n];
     out.growth[n] = {along.x, along.y, along.z, piece.growth.growth[n]};

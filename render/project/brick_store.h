@@ -52,9 +52,10 @@ struct StoredPiece {
 
   float x, y, z, weight;
   float axis0, axis1, axis2;  // of its Shape
-  uint32_t counts;            // bits 0-7: faces; 8-15: bit n of a face that is edge_on; 16-23: axes of growth
+  // Bits 0-7: faces; 8-15: bit n of a face that is edge_on; 16-23: axes of growth; 24: a plate.
+  uint32_t counts;
   float shear10, shear20, shear21, unused;
-  std::array<std::array<float, 4>, kMaxFaces> faces;  // CutFace: inward, distance
+  std::array<std::array<float, 4>, kMaxFaces> faces;  // CutFace: inward, distance; a plate's first: across
   std::array<std::array<float, 4>, 3> growth;         // GrowthAxes: along, growth
 };
 static_assert(sizeof(StoredPiece) == 144);

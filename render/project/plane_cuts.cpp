@@ -212,6 +212,17 @@ DepthsLeft DepthsLeft::atCentre(const ScreenCut& cut) {
   return {left.x, std::sqrt(std::clamp(7 * variance, 0.0f, 1.0f))};
 }
 
+float shareOfAlong(const ScreenRows& rows, const SplatPiece& piece, float low_pass_px2) {
+  const float across2 = glm::dot(piece.across, piece.across);
+  if (!(across2 > 0)) return 1;
+  const RayFrame ray(rows, piece.shape, low_pass_px2);
+  const float facing = glm::dot(ray.along, piece.across), facing2 = facing * facing;
+  const float tangent2 = (ray.nn * across2 - facing2) / facing2;
+  const float tangent = std::sqrt(std::max(0.0f, tangent2) * ray.determinant / ray.nn);
+  const float share = 1 - kPlatesBehind * std::max(0.0f, tangent - kPlatesFrom);
+  return share > 0 ? share : 0.0f;  // of NaN, too
+}
+
 ScreenDepth depthAlongRay(const ScreenRows& rows, const glm::vec3& depth_row, float depth,
                           const SplatPiece& piece, const Ellipse& ellipse, float low_pass_px2) {
   const RayFrame ray(rows, piece.shape, low_pass_px2);

@@ -96,12 +96,20 @@ struct DepthsLeft {
   static DepthsLeft atCentre(const ScreenCut& cut);
 };
 
-/// Returns `along` of a splat that is cut: what is left hides less of itself, by both its depths and its optical depth. Painters
-/// take the optical depth of all of it.
+/// Returns `along` of a splat that is cut at faces alone: what is left hides less of itself, by both its depths and its optical
+/// depth. Painters take the optical depth of all of it. Where it meets layers, they take what each window leaves.
 inline float alongLeft(const Ellipse& ellipse, const ScreenCut& cut) {
   const DepthsLeft left = DepthsLeft::atCentre(cut);
   return ellipse.along * left.share * left.deviation;
 }
+
+/// A plate loses of its `along` kPlatesBehind times the tangent, less kPlatesFrom, of the angle between the ray and its normal, in the
+/// frame of the kernel and with the low-pass' widening: by sums along rays through plates of optical depths of 1 to 10.
+inline constexpr float kPlatesBehind = 0.38f, kPlatesFrom = 0.1f;
+
+/// Returns the share of its `along` that a piece has. Plates beside one another that are seen obliquely lie behind one another in
+/// a pixel, so a part of what is nearer than the middle of all is shown by their order already; 1 for other pieces.
+float shareOfAlong(const ScreenRows& rows, const SplatPiece& piece, float low_pass_px2);
 
 /// `depth_row`: the depth per unit of the data. `depth`: of the piece's centre.
 ScreenDepth depthAlongRay(const ScreenRows& rows, const glm::vec3& depth_row, float depth,

@@ -205,8 +205,9 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   bool part_clipped = false;             // a clip plane crosses the part
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
-    const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
-                                      piece.weight * at.volume, map.low_pass);
+    Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
+                                piece.weight * at.volume, map.low_pass);
+    ellipse.along *= shareOfAlong(at.rows, piece, map.low_pass.footprint_px2);
     LayerSide side = LayerSide::kBefore;
     if (!cutting.layers.empty())
       side = cutting.layers.sideOf(at.x, at.y, ellipse, at.depth, at.depth_row, piece.shape);
@@ -228,7 +229,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
       const Ellipse cell = ellipseOf(at.rows, whole.shape, whole.slope, variable.variance[i],
                                      whole.weight * at.volume, map.low_pass);
       keepScalarOf(cell, whole.mean, x, y, splat, cut);
-    } else if (faces) {
+    } else if (faces && !across) {
       splat.along = alongLeft(ellipse, cut);
     }
     ScreenDepth along_ray;

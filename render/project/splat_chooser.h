@@ -216,14 +216,14 @@ class LocalLayers {
 template <typename Map>
 ScreenColour colourOf(const Map& map, const PlacedPiece& at, const SplatPiece& piece, float variance,
                       bool faces, bool across) {
-  const Ellipse e =
-      ellipseOf(at.rows, piece.shape, piece.slope, variance, piece.weight * at.volume, map.low_pass);
+  Ellipse e = ellipseOf(at.rows, piece.shape, piece.slope, variance, piece.weight * at.volume, map.low_pass);
+  e.along *= shareOfAlong(at.rows, piece, map.low_pass.footprint_px2);
   ScreenColour colour{piece.mean, {e.slope0, e.slope1}, e.half_width, 0, e.along};
   if (faces) {
     ScreenCut cut;
     cutAtFaces(at.rows, piece, e, map.low_pass.footprint_px2, cut);
     colour.correlation = cut.correlation;
-    colour.along = alongLeft(e, cut);
+    if (!across) colour.along = alongLeft(e, cut);
   }
   if (across)
     colour.correlation =

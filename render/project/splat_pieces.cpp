@@ -55,6 +55,7 @@ std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column) {
   SplatPiece half = piece;
   half.weight *= 0.5f;
   half.growth.count = 0;
+  half.across[column] *= 0.5f;
   float& axis = column == 0 ? half.shape.axis0 : column == 1 ? half.shape.axis1 : half.shape.axis2;
   float& slope = column == 0 ? half.slope.w0 : column == 1 ? half.slope.w1 : half.slope.w2;
   const float mean_step = 0.25f * slope;
@@ -181,8 +182,10 @@ size_t partsAtBorder(const SplatPiece& whole, const InwardAxes& inward, uint32_t
     pieces[0].growth.count = 0;
     constexpr auto kLess = static_cast<float>(1 - kPlateThickness * kPlateThickness);
     const glm::vec3& q = inward.axis[0];
-    reshape(pieces[0], {1 - kLess * q.x * q.x, -kLess * q.y * q.x, 1 - kLess * q.y * q.y, -kLess * q.z * q.x,
-                        -kLess * q.z * q.y, 1 - kLess * q.z * q.z});
+    const Cholesky l(1 - kLess * q.x * q.x, -kLess * q.y * q.x, 1 - kLess * q.y * q.y, -kLess * q.z * q.x,
+                     -kLess * q.z * q.y, 1 - kLess * q.z * q.z);
+    reshape(pieces[0], l);
+    pieces[0].across = transposed(l, q);
     return 1;
   }
   const bool pairs = isOfPairs(style) && inward.ratio == 0;

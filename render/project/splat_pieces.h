@@ -151,6 +151,7 @@ struct SplatPiece {
   float weight;
   CutFaces faces = {};
   GrowthAxes growth = {};  // none of what perspective cuts
+  glm::vec3 across{0.0f};  // of a plate: from one face to the other, as CutFace::inward but of any length
 };
 
 /// Splat `i`, which is not cut.

@@ -37,7 +37,14 @@ RootCube RootCube::around(const glm::dvec3& lower, const glm::dvec3& upper) {
   const glm::dvec3 extent = upper - lower;
   double size = std::max({extent.x, extent.y, extent.z}) * (1 + 1e-9);
   if (!(size > 0)) size = 1.0;
-  return {0.5 * (lower + upper) - 0.5 * size, size};
+  constexpr int kThin = 5;  // the level whose cells are as large as a voxel of the root's brick
+  RootCube root{0.5 * (lower + upper) - 0.5 * size, size};
+  for (int axis = 0; axis < 3; ++axis) {
+    int level = 0;
+    while (level < kMaxLevel && (1 + 1e-9) * extent[axis] <= std::ldexp(size, -level - 1)) ++level;
+    if (level >= kThin) root.min[axis] -= std::ldexp(size, -level - 1);
+  }
+  return root;
 }
 
 RootPosition RootCube::fromWorld(const glm::dvec3& world) const {

@@ -73,7 +73,9 @@ struct RootCube {
   double size = 1.0;
 
   /// The smallest cube, centred on the box and 1e-9 larger than its longest side, that holds the closed box
-  /// [lower, upper]. A box without extent gives a cube of size 1. Throws Error if a bound is not finite.
+  /// [lower, upper]. But along an axis on which the box is no thicker than a voxel of the root's brick, it lies in
+  /// the middle of a cell of each level whose cells hold it: coarse levels do not halve it. A box without extent
+  /// gives a cube of size 1. Throws Error if a bound is not finite.
   static RootCube around(const glm::dvec3& lower, const glm::dvec3& upper);
 
   /// The position of a point, rounded down to the lattice. A point outside the cube is moved to its face.

@@ -119,19 +119,21 @@ glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, const glm::d
   if (depth == 0) return glm::dvec4(0.0);
   const float widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
   const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};
+  // Between layers: by what is left there.
+  const double hides = cuts.depth ? std::sqrt(left.variance) : 1, of_depth = cuts.depth ? left.share : 1;
   const auto meanOf = [&](const ClassificationTable& of, const ScreenColour& scalar, const NearSide& seen) {
     if (!shading.per_pixel) return of.mean(scalar.mean, 0);
     const double w = scalar.half_width, deviation = scalar.correlation * w / std::sqrt(3.0);
     return of.mean(scalar.mean + double{scalar.slope[0]} * u0 + double{scalar.slope[1]} * u1 +
-                       deviation * left.mean - std::sqrt(3.0) * scalar.along * seen.nearer,
+                       deviation * left.mean - std::sqrt(3.0) * hides * scalar.along * seen.nearer,
                    std::sqrt(std::max(0.0, w * w - 3 * deviation * deviation * (1 - left.variance) -
-                                               3 * std::pow(scalar.along, 2) * (1 - seen.variance))));
+                                               3 * std::pow(hides * scalar.along, 2) * (1 - seen.variance))));
   };
   const ScreenColour own{
       splat.mean, {splat.slope0, splat.slope1}, widest, static_cast<float>(cuts.correlation()), splat.along};
   glm::dvec4 mean = meanOf(table, own, NearSide(0));
   if (mean.w == 0) return glm::dvec4(0.0);
-  const NearSide seen(mean.w * cellDepth(splat, shading.low_pass_px2));
+  const NearSide seen(mean.w * of_depth * cellDepth(splat, shading.low_pass_px2));
   if (cuts.colour) {
     const glm::dvec3 colour(meanOf(*shading.colours, ScreenColour::of(*cuts.colour), seen));
     mean = glm::dvec4(mean.w * colour, mean.w);

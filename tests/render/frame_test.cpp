@@ -95,6 +95,30 @@ TEST_P(FrameTest, AConstantFieldIsFlat) {
   }
 }
 
+// A layer of plates of four pixels, with constant extinction and grey values from 0 to 1 through it: what is seen of it is the mean
+// grey value, weighted by what is left of the ray. Obliquely several plates lie behind one another in a pixel.
+TEST_P(FrameTest, PlatesBesideOneAnotherAreOneLayer) {
+  constexpr double kThickness = 0.125, kDepth = 1;
+  writePlatesCache(path(), kThickness);
+  const CacheReader cache(path());
+  const double opacity = -std::expm1(-kDepth / kThickness);
+  const TransferFunction grey =
+      function("0, 0, 0, 0, 1, 1, 1, 1", fmt::format("0, {0}, 0.5, 0, 1, {0}, 0.5, 0", opacity));
+  FrameRenderer renderer(cache, 0, grey, GetParam());
+  FrameOptions wanted = options();
+  wanted.background = glm::vec4(0, 0, 0, 1);
+  for (const double degrees : {0.0, 30.0, 60.0, 80.0}) {
+    const double angle = degrees * M_PI / 180, tau = kDepth / std::cos(angle);
+    const glm::dvec3 direction(0.8 * std::sin(angle), 0.6 * std::sin(angle), std::cos(angle));
+    FrameStatistics statistics;
+    const Image image = renderer.render(cameraFrom(direction, 12.5), wanted, statistics);
+    double sum = 0;
+    for (int y = 47; y < 53; ++y)
+      for (int x = 50; x < 70; ++x) sum += image.pixel(x, y)[0] / 120;
+    EXPECT_NEAR(sum, 1 + std::expm1(-tau) / tau, 0.02) << degrees;
+  }
+}
+
 TEST_P(FrameTest, PerspectiveRaysOfAConstantFieldHaveTheirLength) {
   const double extinction = 0.03;
   FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction), GetParam());

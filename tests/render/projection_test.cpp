@@ -320,6 +320,61 @@ TEST(Projection, WhatAPlaneLeavesHidesLessOfItself) {
   }
 }
 
+// The colours' scalar is the splat's own times -2: it goes with the depth as strongly, the other way. Behind a clip plane, between
+// two layers of the pixels, and both.
+TEST(Projection, ColoursGoWithTheDepthAsTheirScalarDoes) {
+  Random random(14);
+  const ImageSize size{40, 30};
+  const glm::dvec3 corner{-0.3, -0.2, -0.4};
+  int cut = 0, placed = 0, strong = 0;
+  for (int n = 0; n < 400; ++n) {
+    const TestSplat splat = random.splat(0.05, 5, glm::dvec3(0));
+    const Projection projection = n % 2 ? Projection::kOrthographic : Projection::kPerspective;
+    ProjectionSettings settings{
+        ScreenView::of(randomCamera(random, projection), size, glm::dvec3(1), 0.3, 1e-3)};
+    const ScreenView& view = settings.view;
+    if (n % 3 != 0) settings.clip_planes = {{splat.splat.position, random.direction()}};
+    const glm::dvec3 at = view.viewFromData(splat.splat.position);
+    const double depth = projection == Projection::kPerspective ? glm::length(at) : at.z;
+    std::vector<PixelLayers::Row> rows(static_cast<size_t>(size.height));
+    for (PixelLayers::Row& row : rows)
+      for (int x = 0; x < size.width; ++x) {
+        for (const double behind : {-0.01, 0.01})
+          row.layers.push_back({static_cast<float>(depth + behind), {0.1f, 0.1f, 0.1f, 0.2f}});
+        row.endPixel(row.layers.size() - 2);
+      }
+    const PixelLayers layers(size, std::move(rows), 0);
+    if (n % 3 != 1) settings.layers = &layers;
+    SplatGeometry geometry;
+    SplatVariable own, colours;
+    splat.appendTo(geometry, own, corner);
+    colours = own;
+    colours.mean[0] *= -2, colours.variance[0] *= 4;
+    colours.slope0[0] *= -2, colours.slope1[0] *= -2, colours.slope2[0] *= -2;
+    BrickProjector projector;
+    const SplatRange all{0, 1};
+    projector.project(settings, opaque(), corner, arraysOf(geometry),
+                      BrickValues(arraysOf(own), arraysOf(colours)), {&all, 1});
+    if (projector.splats().empty()) continue;  // behind the plane
+    const ScreenSplat& drawn = projector.splats().back();
+    const SplatRecords records = SplatRecords::beside(&drawn, -1, true);
+    ASSERT_TRUE(records.colour);
+    const ScreenColour colour = ScreenColour::of(*records.colour);
+    double correlation = 0;
+    if (records.cut) correlation = ScreenCut::of(*records.cut).correlation;
+    if (records.depth) correlation = ScreenDepth::of(*records.depth).correlation;
+    EXPECT_NEAR(colour.correlation, -correlation, 1e-4) << n;
+    EXPECT_NEAR(colour.along, -2 * drawn.along, 1e-4 * std::abs(drawn.along)) << n;
+    EXPECT_NEAR(colour.half_width, 2 * drawn.half_width, 1e-4 * drawn.half_width) << n;
+    cut += records.cut && !records.depth;
+    placed += records.depth != nullptr;
+    strong += std::abs(correlation) > 0.3;
+  }
+  EXPECT_GT(cut, 80);
+  EXPECT_GT(placed, 150);
+  EXPECT_GT(strong, 150);
+}
+
 TEST(Projection, DepthOrdersAlongTheViewAndFromTheEye) {
   SplatGeometry geometry;
   SplatVariable variable;

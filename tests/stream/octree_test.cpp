@@ -28,6 +28,23 @@ TEST(RootCube, HoldsItsBoxAndRoundTrips) {
   }
 }
 
+// Voxels of a brick are 1/32 of its cell.
+TEST(RootCube, HalvesNothingThinAtCoarseLevels) {
+  for (const double thickness : {0.0, 1e-9, 0.003, 0.016, 0.0312}) {
+    const glm::dvec3 lower(-1, 2, 3), upper(lower + glm::dvec3(thickness, 1, 0.7 * thickness));
+    const RootCube root = RootCube::around(lower, upper);
+    for (const int axis : {0, 2})
+      for (uint32_t level = 0; level < 20 && root.cellSize(level) > upper[axis] - lower[axis]; ++level)
+        EXPECT_EQ(Cell::of(root.fromWorld(lower), level).at[axis],
+                  Cell::of(root.fromWorld(upper), level).at[axis])
+            << thickness << ' ' << level;
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_LE(root.min[axis], lower[axis]);
+      EXPECT_GE(root.min[axis] + root.size, upper[axis]);
+    }
+  }
+}
+
 TEST(RootCube, OfAPointHasAnExtent) {
   EXPECT_EQ(RootCube::around({5, 5, 5}, {5, 5, 5}).size, 1.0);
 }

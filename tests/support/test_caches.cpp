@@ -185,6 +185,38 @@ void writeLatticeCache(const std::filesystem::path& path, double constant, const
   writer.finish(manifest);
 }
 
+void writePlatesCache(const std::filesystem::path& path, double thickness) {
+  const RootCube root{glm::dvec3(0), kLatticeSide};
+  constexpr uint64_t kNodes = uint64_t{kLatticeSide} * kLatticeSide;
+  BrickSplats brick;
+  brick.variables.resize(2);
+  for (uint64_t n = 0; n < kNodes; ++n) {
+    const glm::dvec3 at(static_cast<double>(n % kLatticeSide) + 0.5,
+                        static_cast<double>(n / kLatticeSide) + 0.5, 0.5 * kLatticeSide);
+    brick.positions.push_back(root.fromWorld(at));
+    Splat splat;
+    splat.axis = {1, 1, thickness};
+    splat.weight = thickness;
+    brick.splats.push_back(splat);
+    brick.border_codes.push_back(packPlateCode({0, 0, 1}));
+    for (size_t v = 0; v < 2; ++v) brick.variables[v].push_back({v == 0 ? 0.5 : -0.5, {0, 0, 1}, 0});
+  }
+  brick.runs.push_back({0, 0, 0, 0, kNodes});
+  CacheWriter writer(path, true, root, {{0, "f", "", 0, 1}, {1, "g", "", -1, 0}});
+  writer.append(encodeBrick(root, brick), 0);
+  Manifest manifest;
+  manifest.title = "plates";
+  manifest.program = "test";
+  manifest.sources = {"none"};
+  manifest.reader = "none";
+  manifest.lower = {0, 0, 0.5 * (kLatticeSide - thickness)};
+  manifest.upper = {kLatticeSide, kLatticeSide, 0.5 * (kLatticeSide + thickness)};
+  manifest.blocks = {{"block 1", kNodes, 1, 1}};
+  manifest.nodes = kNodes;
+  manifest.requirements = {kBorderFaces, kFaceLayers, kMergedBorders, kPlates};
+  writer.finish(manifest);
+}
+
 namespace {
 
 constexpr uint32_t kLeafSplats = 11'000, kInnerSplats = 24 * 24 * 24;

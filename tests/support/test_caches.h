@@ -162,6 +162,10 @@ struct LatticeBrick {
 /// 8³ splats in a cell of writeLatticeCache(), of level 2 at most.
 BrickSplats latticeBrick(const RootCube& root, const Cell& cell, const LatticeBrick& of);
 
+/// Writes a cache of one brick: plates beside one another, of unit length and width, that fill the square [0, 32]² and are
+/// `thickness` thick, about z = 16. Two scalars "f" and "g", which rise by 1 through each from 0 and -1.
+void writePlatesCache(const std::filesystem::path& path, double thickness);
+
 /// The levels of writeSparseCache() whose bricks hold splats: those of writeLatticeCache().
 inline constexpr uint32_t kRealLevels = 3;
 
