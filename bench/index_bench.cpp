@@ -71,7 +71,7 @@ BENCHMARK(openIndex)->Unit(benchmark::kMillisecond);
 
 void makePlanner(benchmark::State& state) {
   reader();
-  for (auto _ : state) benchmark::DoNotOptimize(planner().bytes());
+  for (auto _ : state) benchmark::DoNotOptimize(planner().bytes({}));
 }
 BENCHMARK(makePlanner)->Unit(benchmark::kMillisecond);
 

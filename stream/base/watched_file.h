@@ -51,7 +51,7 @@ class WatchedFile {
 /// Notes that a file leads to others, for WatchedFiles that are made later. Any thread.
 void noteLinks(const std::filesystem::path& from, const std::set<std::filesystem::path>& to);
 
-/// What has been noted is behind this mutex: whoever holds it while the process forks finds it free in both processes.
+/// Guards what noteLinks() notes. Whoever holds it while the process forks finds it free in both processes.
 Mutex& linksMutex();
 
 /// Some files, with those that they lead to at any depth (noteLinks()).
