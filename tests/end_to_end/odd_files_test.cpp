@@ -96,14 +96,14 @@ TEST_F(OddFiles, InputsAreNotOverwritten) {
                 {"would overwrite"});
   expectRefused(cubeArguments(folder_ / "cube", {"--stats", file("./cube.fun")}, folder_ / "b.splats"), 1,
                 {"would overwrite"});
-  expectRefused({"render", cache(), "-o", cache() + "/a.png"}, 1, {"would overwrite"});
+  expectRefused({"render", cache(), "-o", cache() + "/a.png"}, 1, {"lies in"});
   expectRefused({"render", cache(), "-o", file("a.png"), "--stats", cache() + "/manifest.json"}, 1,
-                {"would overwrite"});
-  expectRefused({"bench", cache(), "--quick", "--json", cache() + "/bricks.bin"}, 1, {"would overwrite"});
+                {"lies in"});
+  expectRefused({"bench", cache(), "--quick", "--json", cache() + "/bricks.bin"}, 1, {"lies in"});
   for (const std::string& output : {cache() + "/manifest.json", file("cube.fun"), file("./cube.xyz")})
     expectRefused({"info", cache(), "--probe-line", "0,0,0", "1,1,1", "3", "--source", file("cube.xyz"),
                    file("cube.fun"), "-o", output},
-                  1, {"would overwrite"});
+                  1, {output.starts_with(cache()) ? "lies in" : "would overwrite"});
   expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("./a.png")}, 1, {"would overwrite"});
   expectRefused(
       {"render", cache(), "-o", file("a.png"), "--stats", file("b.png"), "--first-image", file("b.png")}, 1,
@@ -127,9 +127,9 @@ TEST_F(OddFiles, InputsAreNotOverwritten) {
         {"would overwrite"});
   }
   expectRefused(cubeArguments(folder_ / "cube", {"--overwrite", "--stats", cache() + "/manifest.json"}), 1,
-                {"would overwrite"});
+                {"lies in"});
   fs::create_symlink(cache() + "/a.png", file("into.png"));
-  expectRefused({"render", cache(), "-o", file("into.png")}, 1, {"would overwrite"});
+  expectRefused({"render", cache(), "-o", file("into.png")}, 1, {"lies in"});
   EXPECT_TRUE(readTextFile(file("cube.xyz")) == grid);
   expectWhole("cube.splats");
   run({"render", cache(), "-o", file("a.png"), "--size", "16x16"});
