@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <map>
 #include <memory>
@@ -196,13 +198,25 @@ TEST_F(Isosurfaces, MeshesOfTheGridsOwnCellsLieOnThemToo) {
       run({"export", cache, "-o", file("other.ply"), "--iso", "0.5", "--source", grid, file("other.fun")});
   expectSays(other.err, "warning: f is from 0.14");
   expectSays(other.err, "they may be of another time step");
-  // Probes compare values at their points: a sixth of these are far apart.
+  // Probes compare values at their points.
   const auto probed = [&](const std::string& values) {
-    return run({"info", cache, "--probe-line", "-2,0.1,2.5", "2,0.1,2.5", "12", "--source", grid, values})
+    return run({"info", cache, "--probe-line", "-0.75,-0.3,0.1", "-0.6,0.4,0.9", "12", "--source", grid,
+                values})
         .err;
   };
   EXPECT_EQ(probed(file("own.fun")), "");
-  expectSays(probed(file("other.fun")), "in the files of --source; they may be of another time step");
+  expectSays(probed(file("other.fun")),
+             "the files of --source have no values within the ranges of the cache; they may be");
+  std::string values = readTextFile(file("own.fun"));  // four integers, then the values: 0.14 to 1
+  for (size_t at = 4 * sizeof(int32_t); at < values.size(); at += sizeof(float)) {
+    float value = 0;
+    std::memcpy(&value, &values[at], sizeof value);
+    value = 1.14f - value;
+    std::memcpy(&values[at], &value, sizeof value);
+  }
+  std::ofstream(file("turned.fun"), std::ios::binary) << values;
+  std::filesystem::copy_file(file("own.nam"), file("turned.nam"));
+  expectSays(probed(file("turned.fun")), "in the files of --source; they may be of another time step");
   const struct {
     Words options;
     int status;

@@ -324,7 +324,7 @@ TEST_F(RenderOptions, WrongOptionsAreUsageErrors) {
                {{"--first-image", "a.jpg"}, ".png"},
                {{"--orbit", "90"}, "all frames would have the same name"},
                {{"--path", "a.json"}, "all frames would have the same name"},
-               {{"--frames", "3"}, "--orbit or --path"},
+               {{"--frames", "3"}, "--orbit, --path"},
                {{"--orbit", "90", "--path", "a.json", "--frames", "3"}, "cannot be combined"},
                {{"--path", "a.json", "--frames", "3", "--view", "iso"}, "key frames place the camera"},
                {{"--orbit", "90", "--frames", "0"}, "1 to 100000"},

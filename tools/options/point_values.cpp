@@ -13,6 +13,7 @@
 #include "preprocess/mesh/mesh_source.h"
 #include "preprocess/probe/source_probe.h"
 #include "stream/base/error.h"
+#include "stream/base/text.h"
 #include "stream/cache/probe.h"
 #include "tools/options/convert_arguments.h"
 
@@ -126,6 +127,18 @@ std::string doubtOf(const Manifest& manifest, std::span<const glm::dvec3> points
                     std::span<const std::optional<SourceValues>> of_source) {
   constexpr double kFar = 0.1;   // of the scalar's range
   constexpr size_t kOneIn = 10;  // points
+  // Values beyond the cache's ranges are those of blanked samples.
+  size_t of_cache_alone = 0, in_cache = 0;
+  for (size_t p = 0; p < points.size(); ++p) {
+    if (!of_cache[p] || of_cache[p]->is_beyond) continue;
+    ++in_cache;
+    of_cache_alone += !of_source[p];
+  }
+  if (of_cache_alone > 1 && 2 * of_cache_alone > in_cache)
+    return fmt::format(
+        "at {} of {} the files of --source have no values within the ranges of the cache; they may be of "
+        "another time step",
+        of_cache_alone, countText(in_cache, "point"));
   for (size_t v = 0; v < manifest.variables.size(); ++v) {
     const VariableInfo& variable = manifest.variables[v];
     size_t compared = 0, far = 0;
