@@ -120,7 +120,8 @@ glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, const glm::d
   const float widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
   const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};
   // Between layers: by what is left there.
-  const double hides = cuts.depth ? std::sqrt(std::max(0.0, left.variance)) : 1, of_depth = cuts.depth ? left.share : 1;
+  const double hides = cuts.depth ? std::sqrt(std::max(0.0, left.variance)) : 1,
+               of_depth = cuts.depth ? left.share : 1;
   const auto meanOf = [&](const ClassificationTable& of, const ScreenColour& scalar, const NearSide& seen) {
     if (!shading.per_pixel) return of.mean(scalar.mean, 0);
     const double w = scalar.half_width, deviation = scalar.correlation * w / std::sqrt(3.0);
