@@ -330,9 +330,9 @@ TEST_F(WindowPanels, NothingIsCutOffAtThePanelsEdge) {
   open({"--surface", "kmin", "--iso", "0.5", "--slice", "-0.5,0,0.5,0.2,1,0.1"}, kScreen);
   save();
   const int end = placeOf("scalar", 1).first + 1, wide_end = placeOf("picture", 0).first;
+  size_t compared = 0;
   const auto compare = [&] {
     std::ifstream file("widgets");
-    size_t compared = 0;
     for (std::string line; std::getline(file, line);) {
       std::istringstream words(line);
       int x = 0, y = 0, width = 0, height = 0;
@@ -346,7 +346,6 @@ TEST_F(WindowPanels, NothingIsCutOffAtThePanelsEdge) {
       EXPECT_LE(x + width, below ? wide_end : end) << widget;
       ++compared;
     }
-    EXPECT_GT(compared, 12u);
   };
   // From below, so that those to come stay where they are. What the picture has is unfolded at first, and fills the panels.
   const std::pair<const char*, Words> tabs[] = {
@@ -366,6 +365,7 @@ TEST_F(WindowPanels, NothingIsCutOffAtThePanelsEdge) {
   click("add key frame");
   placeOf("film time");
   compare();
+  EXPECT_GT(compared, 150u);
   close();
 }
 
