@@ -267,6 +267,14 @@ HWY_INLINE void blendOver(const Ellipse& e, const float* HWY_RESTRICT footprint,
       colours);
 }
 
+/// Blends a splat of lines, along s, over a block.
+HWY_INLINE void blendOver(const Ellipse& e, const float* HWY_RESTRICT footprint, Corner corner,
+                          const Along& s, const Lines& lines, BlockColours& colours) {
+  blendOver(
+      e, footprint, corner,
+      [&](const Pixels& pixels, V(&value)[4]) HWY_ATTR { lines.valuesAt(s.at(pixels), value); }, colours);
+}
+
 /// Paints a block: blend(its colours). Returns whether it is saturated then.
 template <typename Blend>
 HWY_INLINE bool paintBlock(float* HWY_RESTRICT block, const Blend& blend) {

@@ -201,7 +201,7 @@ HWY_INLINE void blendCut(const Ellipse& e, const Cuts& cuts, const float* HWY_RE
   }
 }
 
-/// The same by one parabola, or one colour.
+/// Blends what is left of a splat of one parabola, or one colour.
 HWY_INLINE void blendCut(const Ellipse& e, const Cuts& cuts, const float* HWY_RESTRICT footprint,
                          Corner corner, const CutShade& cut_shade, BlockColours& colours) {
   const Floats d;
@@ -372,16 +372,13 @@ HWY_INLINE void blendFitted(const CutSplat& cut, const float* footprint, int blo
   if (left == Left::kSome) blendCut(cut.e, {cut.faces, cut.line, {}}, footprint, corner, cut.shade, colours);
 }
 
-/// The same of one that has lines. The depths that are left do not move its scalar.
+/// Blends a splat that has lines, and is not windowed, over a block. The depths that are left do not move its scalar.
 HWY_INLINE void blendLines(const CutSplat& cut, const Lines& lines, const float* footprint, int block,
                            BlockColours& colours) {
   const Corner corner = cornerOf(block);
   const Left left = leftIn(cut.block_faces, corner);
   const Along& s = cut.shade.whole.s;
-  if (left == Left::kAll)
-    blendOver(
-        cut.e, footprint, corner,
-        [&](const Pixels& pixels, V(&value)[4]) HWY_ATTR { lines.valuesAt(s.at(pixels), value); }, colours);
+  if (left == Left::kAll) blendOver(cut.e, footprint, corner, s, lines, colours);
   if (left == Left::kSome)
     blendCut(
         cut.e, {cut.faces, cut.line, {}}, footprint, corner,
@@ -420,20 +417,16 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
   if (cut.windowed)
     return paintBlocks(blocks,
                        [&](int block) HWY_ATTR { return paintWindowed(work, cut, footprint, block); });
-  const auto blend = [&](const auto& blend_block) HWY_ATTR {
-    return paintBlocks(blocks, [&](int block) HWY_ATTR {
-      return paintBlock(work.tile + block * kBlockFloats,
-                        [&](BlockColours& colours) HWY_ATTR { blend_block(block, colours); });
-    });
-  };
   if (cut.fit != kOther)
-    return blend([&](int block, BlockColours& colours)
-                     HWY_ATTR { blendFitted(cut, footprint, block, colours); });
+    return blendBlocks(work, blocks, [&](int block, BlockColours& colours) HWY_ATTR {
+      blendFitted(cut, footprint, block, colours);
+    });
   Lines lines;
   if (mayHaveLines(visit, cut) && fitLines(work, visit, lines)) {
     cut.shade.whole.s = alongLines(visit);
-    return blend([&](int block, BlockColours& colours)
-                     HWY_ATTR { blendLines(cut, lines, footprint, block, colours); });
+    return blendBlocks(work, blocks, [&](int block, BlockColours& colours) HWY_ATTR {
+      blendLines(cut, lines, footprint, block, colours);
+    });
   }
   return paintLookedUpBlocks(work, blocks, cut.lit, [&](int block, LookedUp& out) HWY_ATTR {
     return lookUpCut(work, cut, footprint, block, out);

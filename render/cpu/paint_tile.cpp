@@ -47,22 +47,10 @@ HWY_INLINE void blendPlain(const Plain& plain, const float* footprint, Corner co
 }
 
 HWY_INLINE void blendLined(const Lined& lined, const float* footprint, Corner corner, BlockColours& colours) {
-  blendOver(
-      lined.e, footprint, corner,
-      [&](const Pixels& pixels, V(&value)[4]) HWY_ATTR { lined.lines.valuesAt(lined.s.at(pixels), value); },
-      colours);
+  blendOver(lined.e, footprint, corner, lined.s, lined.lines, colours);
 }
 
 // These paint `blocks`, and return those of them that are saturated then.
-
-/// blend(the corner of a block, its colours)
-template <typename Blend>
-HWY_INLINE BlockMask blendBlocks(const TileWork& work, BlockMask blocks, const Blend& blend) {
-  return paintBlocks(blocks, [&](int block) HWY_ATTR {
-    return paintBlock(work.tile + block * kBlockFloats,
-                      [&](BlockColours& colours) HWY_ATTR { blend(cornerOf(block), colours); });
-  });
-}
 
 HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
                                          const Scalar& scalar, const Lit& lit, const float* footprint) {
@@ -96,13 +84,13 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Vi
     alignas(Plain) std::byte place[sizeof(Plain)];
     auto* const plain = reinterpret_cast<Plain*>(place);
     makePlain(visit, plain);
-    return blendBlocks(work, blocks, [&](Corner corner, BlockColours& colours) HWY_ATTR {
-      blendPlain(*plain, footprint, corner, colours);
+    return blendBlocks(work, blocks, [&](int block, BlockColours& colours) HWY_ATTR {
+      blendPlain(*plain, footprint, cornerOf(block), colours);
     });
   }
   if (Lined lined; makeLined(work, visit, lined))
-    return blendBlocks(work, blocks, [&](Corner corner, BlockColours& colours) HWY_ATTR {
-      blendLined(lined, footprint, corner, colours);
+    return blendBlocks(work, blocks, [&](int block, BlockColours& colours) HWY_ATTR {
+      blendLined(lined, footprint, cornerOf(block), colours);
     });
   return paintPixelByPixel(work, blocks, visit.ellipse(), visit.scalar(), visit.all.lit(work, visit.n),
                            footprint);
@@ -334,8 +322,9 @@ class Listed {
       makeCut(*work_, visit, splat, cut);
       if (cut.windowed) return {kWindowed, last(cuts_)};
       if (cut.fit != kOther) return {kCut, last(cuts_)};
-      if (!mayHaveLines(visit, cut) || !fitLines(*work_, visit, lined_cuts_.emplace_back().lines)) {
-        if (mayHaveLines(visit, cut)) lined_cuts_.pop_back();
+      if (!mayHaveLines(visit, cut)) return {kCutPixels, last(cuts_)};
+      if (!fitLines(*work_, visit, lined_cuts_.emplace_back().lines)) {
+        lined_cuts_.pop_back();
         return {kCutPixels, last(cuts_)};
       }
       cut.shade.whole.s = alongLines(visit);

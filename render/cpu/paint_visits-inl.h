@@ -225,6 +225,15 @@ HWY_INLINE BlockMask paintBlocks(BlockMask blocks, const Paint& paint) {
   return saturated;
 }
 
+/// Paints blocks of a tile: blend(block, its colours). Returns those that are saturated then.
+template <typename Blend>
+HWY_INLINE BlockMask blendBlocks(const TileWork& work, BlockMask blocks, const Blend& blend) {
+  return paintBlocks(blocks, [&](int block) HWY_ATTR {
+    return paintBlock(work.tile + block * kBlockFloats,
+                      [&](BlockColours& colours) HWY_ATTR { blend(block, colours); });
+  });
+}
+
 /// Paints blocks with a look-up for every pixel: look_up(block, where to), false for nothing. A few blocks
 /// are looked up before they are blended: what was written as many narrow vectors is not ready at once to be
 /// read as a wide one.

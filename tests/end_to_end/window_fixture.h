@@ -198,15 +198,23 @@ class WindowTest : public ProgramSuite<WindowTest> {
   }
   /// Whether a widget or a message whose name begins so is in the window.
   static bool hasWidget(const std::string& begin) {
+    return std::ranges::any_of(widgets(), [&](const Widget& one) { return one.name.starts_with(begin); });
+  }
+  struct Widget {
+    int x = 0, y = 0, width = 0, height = 0;
+    std::string name;
+  };
+  /// All that the window says of itself, once a frame; fewer while it writes.
+  static std::vector<Widget> widgets() {
+    std::vector<Widget> found;
     std::ifstream file("widgets");
     for (std::string line; std::getline(file, line);) {
       std::istringstream words(line);
-      int number = 0;
-      std::string name;
-      words >> number >> number >> number >> number;
-      if (std::getline(words >> std::ws, name) && name.starts_with(begin)) return true;
+      Widget one;
+      words >> one.x >> one.y >> one.width >> one.height;
+      if (std::getline(words >> std::ws, one.name)) found.push_back(std::move(one));
     }
-    return false;
+    return found;
   }
   /// The command's picture is `picture`.
   static void expectDraws(const Words& command, const Image& picture) {
@@ -236,15 +244,9 @@ class WindowTest : public ProgramSuite<WindowTest> {
   }
 
   static std::optional<Place> placeNow(const std::string& widget, double across, double down) {
-    std::ifstream file("widgets");
-    for (std::string line; std::getline(file, line);) {
-      std::istringstream words(line);
-      int x = 0, y = 0, width = 0, height = 0;
-      std::string name;
-      words >> x >> y >> width >> height;
-      if (std::getline(words >> std::ws, name) && name == widget)
+    for (const auto& [x, y, width, height, name] : widgets())
+      if (name == widget)
         return Place{x + static_cast<int>(across * width), y + static_cast<int>(down * height)};
-    }
     return std::nullopt;
   }
 

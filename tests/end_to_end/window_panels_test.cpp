@@ -332,18 +332,12 @@ TEST_F(WindowPanels, NothingIsCutOffAtThePanelsEdge) {
   const int end = placeOf("scalar", 1).first + 1, wide_end = placeOf("picture", 0).first;
   size_t compared = 0;
   const auto compare = [&] {
-    std::ifstream file("widgets");
-    for (std::string line; std::getline(file, line);) {
-      std::istringstream words(line);
-      int x = 0, y = 0, width = 0, height = 0;
-      std::string widget;
-      words >> x >> y >> width >> height;
-      std::getline(words >> std::ws, widget);
+    for (const Widget& one : widgets()) {
       const bool below =
-          widget.starts_with("Save picture") || widget.starts_with("Save film: once") ||
-          widget.starts_with("Copy command for this");  // the list, with no space for a scroll bar
-      if (x >= end || widget.starts_with("menu ")) continue;
-      EXPECT_LE(x + width, below ? wide_end : end) << widget;
+          one.name.starts_with("Save picture") || one.name.starts_with("Save film: once") ||
+          one.name.starts_with("Copy command for this");  // the list, with no space for a scroll bar
+      if (one.x >= end || one.name.starts_with("menu ")) continue;
+      EXPECT_LE(one.x + one.width, below ? wide_end : end) << one.name;
       ++compared;
     }
   };

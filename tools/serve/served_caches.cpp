@@ -70,8 +70,7 @@ size_t variableOf(const CacheReader& reader, const std::string& name, const std:
 ServedFolders::ServedFolders(const std::vector<fs::path>& paths, FacesOf faces) : faces_(std::move(faces)) {
   for (const fs::path& path : paths) {
     const std::string name = nameOf(path);
-    const auto same =
-        std::ranges::count(folders_, nameOf(path), [](const Folder& one) { return nameOf(one.path); });
+    const auto same = std::ranges::count(folders_, name, [](const Folder& one) { return nameOf(one.path); });
     folders_.push_back({path, same > 0 ? fmt::format("{} ({})", name, same + 1) : name, {}, {}});
     open(folders_.back());
   }

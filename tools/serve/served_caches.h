@@ -77,7 +77,7 @@ class ServedCaches {
 
   /// An error for a page: `text` without paths of this machine.
   std::string errorText(std::string text) const;
-  /// The same for a text without paths.
+  /// An error for a page, of a text that has no paths.
   static std::string refusalText(const std::string& text);
 
  private:
