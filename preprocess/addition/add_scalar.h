@@ -39,7 +39,7 @@ struct AddScalarReport {
   uint64_t nodes = 0, splats = 0;
   uint64_t temporary_bytes = 0;   // of the scattered values
   unsigned threads = 0;           // that worked
-  uint64_t memory_bytes = 0;      // the limit that was kept
+  uint64_t memory_bytes = 0;      // the limit of the addition
   std::vector<FileReport> files;  // the new ones
   std::vector<std::string> warnings;
 };
@@ -52,9 +52,10 @@ class LacksValues final : public Error {
 
 /// Adds the scalars. `source` is read twice (a third time if older scalars blanked nodes that the grid does
 /// not). Nodes that the cache draws must have the new values; those of other nodes are left out, with a
-/// warning. Throws Error if the grid is not the one the cache was made from, or if something outside
-/// fails; LacksValues if a value is missing; UsageError if the cache has a scalar of the name. After an exception the cache is
-/// as it was. The peak memory of the process, everything included, is options.memory_bytes.
+/// warning. Throws Error if the grid is not the one the cache was made from, or if a file, the disk or memory
+/// fails; LacksValues if a value is missing; UsageError if the cache has a scalar of the name. After an
+/// exception the cache is as it was. The peak memory of the process, everything included, is
+/// options.memory_bytes.
 AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& options, Progress& progress);
 
 }  // namespace curvisplat

@@ -31,7 +31,7 @@ struct AddStepOptions {
   bool expect_new_geometry = false;        // for speed only: the previous step had a new geometry
   bool to_part = false;                    // the cache is a part of a series (series_steps.h)
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
-  std::vector<std::filesystem::path> given_folders;  // the user's, if those above are temporary
+  std::vector<std::filesystem::path> given_folders;  // for messages: the user's, if those above are temporary
 
   TestLimits limits;
 };
@@ -46,14 +46,14 @@ struct AddStepReport {
   std::vector<std::string> warnings;
 };
 
-/// statedTime() in the unit of the series, where both have one: each file of a model may count from a date
-/// of its own. Throws Error if it cannot be converted to that unit.
+/// The description's statedTime(), converted to the unit of the series where both have one: each file of a
+/// model may count from a date of its own. Throws Error if it cannot be converted to that unit.
 std::optional<double> timeOf(const GridDescription& description, const TimeUnit& of_series);
 
 /// Adds the step. The cache's scalars are found in the source by name. Throws Error if the step does not fit:
-/// other blocks, a missing scalar, a time that is not after the last; or if something outside fails. After an
-/// exception the cache is as it was; after a kill at any moment it has the steps before. The peak memory of
-/// the process, everything included, is options.memory_bytes.
+/// other blocks, a missing scalar, a time that is not after the last; or if a file, the disk or memory fails.
+/// After an exception the cache is as it was; after a kill at any moment it has the steps before. The peak
+/// memory of the process, everything included, is options.memory_bytes.
 ///
 /// The step is added to each set of scalars with blanks of its own (Manifest::own_blanks), too, before it is added to the cache.
 /// A set that the step lacks, or that has a value at none of its samples, ends with the step before: a warning says so, and later
@@ -65,7 +65,7 @@ struct SeriesInput {
   uint64_t count = 0;
   /// Names a step for messages: "q.0100" or "run.nc, time step 3".
   std::function<std::string(uint64_t)> name;
-  /// Throws Error.
+  /// Opens a step's files. Throws Error.
   std::function<std::unique_ptr<DataSource>(uint64_t)> open;
   /// Positions of the scalars to convert, for the first step. Throws Error.
   std::function<std::vector<uint32_t>(const GridDescription&)> scalars;

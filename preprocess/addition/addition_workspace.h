@@ -19,8 +19,8 @@ namespace curvisplat {
 /// The cache's lock and the temporary folder.
 class AdditionWorkspace {
  public:
-  /// All ranks have to call it, and the cache is locked when it returns. Removes the temporary files of additions that were killed. Throws Error if another program is
-  /// changing the cache, or if a rank does not see the folder.
+  /// Locks the cache, and removes the temporary files of additions that were killed. All ranks call it.
+  /// Throws Error if another program is changing the cache, or if a rank does not see the folder.
   AdditionWorkspace(const std::filesystem::path& cache, const std::filesystem::path& temporary_folder,
                     Ranks& ranks);
   /// Removes the folder.
@@ -32,7 +32,7 @@ class AdditionWorkspace {
   const CacheLock& lock() const { return *lock_; }
   /// The folder that all ranks see.
   const std::filesystem::path& shared() const { return shared_; }
-  /// This rank's own.
+  /// The folder of this rank alone.
   const std::filesystem::path& own() const { return own_; }
 
  private:
@@ -45,8 +45,8 @@ class AdditionWorkspace {
 /// grid.
 void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache);
 
-/// checkBlocks() for a time step's grid: the message names the blocks that the steps before it lack, or have
-/// besides.
+/// checkBlocks() for a time step's grid: the message names the blocks that the step has in addition to those
+/// of earlier steps, or lacks.
 void checkBlocksOfStep(const std::vector<GridBlock>& grid, const Manifest& series);
 
 /// The overlaps of the grid's blocks where `cache` draws each point once; else none. Rank 0

@@ -5,8 +5,9 @@
 //    rank 1   the next group --> a part (series_steps.h) --+
 //    rank 2   the group after that --> a part ------------+--> rank 0 takes the steps over, in order
 //
-// So a round ends; the next begins behind the last step that was taken over. A step that does not fit what one process
-// would have added, or that a rank could not convert, ends the round's taking over: rank 0 converts it in the next one.
+// A round ends when rank 0 has taken over all parts, or meets a step that a rank could not convert, or
+// converted otherwise than one process would have. The next round begins after the last step that was taken
+// over, so rank 0 converts that step.
 #pragma once
 
 #include <cstdint>
@@ -37,25 +38,25 @@ struct ConvertedSteps {
     std::vector<std::string> sources, warnings;
   };
   std::vector<Step> steps;
-  std::string error;  // that has ended it; empty: none
+  std::string error;  // why the rank stopped early; empty: it did not
 };
 
-/// The ranges of all ranks, of the steps from `next` on; the last rank's may be empty. `in_group`: how many steps of its
-/// group the cache has, 0 if the next begins one.
+/// [rank] the steps that it converts in a round, from `next` on; those of the last ranks may be empty.
+/// `in_group`: how many steps of the group of `next` the cache has already; 0 if `next` begins a group.
 std::vector<StepSpan> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks);
 
-/// How the names of the ranks' folders for temporary files begin; those of other caches in a shared folder begin
-/// otherwise. The rank's number follows.
+/// Prefix of the names of the ranks' folders for temporary files; the rank's number follows. It differs from
+/// that of any other cache, so several can use one --tmp.
 std::string scratchNameOfRanks(const std::filesystem::path& cache);
 
-/// The ending that is appended to the cache's name for a folder beside it; it ends with kPartialSuffix.
+/// Suffix of the folder of parts, which lies beside the cache; it ends with kPartialSuffix.
 inline constexpr const char* kRanksSuffix = ".ranks.partial";
 
-/// Parts of a series in a folder beside it, removed in the end.
+/// The parts of a series, in a folder beside its cache that is removed in the end.
 class SharedSteps {
  public:
-  /// `add`: the options of a step, of which the cache is set here. All ranks construct it at the same time; rank 0 makes
-  /// the folder. Throws Error.
+  /// `add`: the options of each step, with the cache of the series; parts have their own cache. All ranks
+  /// construct it at the same time; rank 0 makes the folder. Throws Error.
   SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ranks, Progress& progress);
   ~SharedSteps();
   SharedSteps(const SharedSteps&) = delete;
@@ -70,8 +71,8 @@ class SharedSteps {
   };
   /// Converts this rank's steps to its part, at ranks other than 0. Throws Interrupted.
   ConvertedSteps convertPart(const Start& start) const;
-  /// Takes over, at rank 0, what rank `of` has converted; `took` is called after each step with its number of
-  /// the input. Returns whether that was all of its range.
+  /// Adds to the cache, at rank 0, the steps that rank `of` has converted, and calls `took` after each with
+  /// its number in the input. Returns whether all steps of `range` were added.
   bool join(unsigned of, const StepSpan& range, const ConvertedSteps& converted,
             const std::function<void(uint64_t number, const AddStepReport&)>& took) const;
 
@@ -87,8 +88,8 @@ class SharedSteps {
   std::unique_ptr<ScratchFolder> scratch_;  // of the others
 };
 
-/// Removes what ranks that were killed in the rounds of this series have left; for one process. Throws Error if ranks
-/// are converting it now.
+/// Removes what killed ranks of an earlier conversion of this series have left. One process calls it. Throws
+/// Error if ranks are converting the series now.
 void removeLeftOfRanks(const std::filesystem::path& cache, const std::filesystem::path& temporary_folder);
 
 Ranks::Bytes toBytes(const ConvertedSteps& converted);

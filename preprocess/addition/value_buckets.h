@@ -11,9 +11,9 @@
 //   18   mean w0 w1 w2                                               4 x float a variable
 //        with variances: variance                                    1 x float a variable
 //
-// Records begin with the node as those of splat_record.h do, so that sortByNode() serves both. Values are
-// rounded as they are there. Places and lengths tell whether the cache has the same splats. Unlike in conversion, what each brick will get is known from the start, so no
-// bucket turns out too large.
+// Records begin with the node, and values are rounded, as in splat_record.h, so that sortByNode() serves
+// both. Places and lengths tell whether the cache has the same splats. Unlike in conversion, the number of
+// splats of each brick is known from the start, so no bucket turns out too large.
 #pragma once
 
 #include <cstddef>
@@ -45,7 +45,7 @@ class NodeNumbers {
 
   /// The number of the first node of a run. Throws Error if the run is not in the grid.
   uint64_t firstOf(const NodeRun& run) const;
-  /// The node's place, in words.
+  /// The node's block and indices, for messages.
   std::string nameOf(uint64_t node) const;
 
  private:
@@ -64,7 +64,7 @@ class ConversionOrder {
   size_t size() const { return order_.size(); }
   /// [position in the order]: the brick in the order of bricks.bin.
   uint32_t operator[](size_t position) const { return order_[position]; }
-  /// The other way round.
+  /// The position in the order of a brick of bricks.bin.
   uint32_t positionOf(uint32_t brick) const { return positions_[brick]; }
 
   /// The leaf brick that holds the splat of `node` at `position`; kNoBrick if there is no cell for it.
@@ -162,7 +162,7 @@ class ValueSink : public SplatSink {
 
   /// Throws Error if the cache has no cell for the splat.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) override;
-  /// Sends what is gathered. To be called at the end.
+  /// Sends the records that are gathered. Call it at the end.
   void flush();
 
  private:

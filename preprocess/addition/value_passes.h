@@ -52,13 +52,15 @@ class ValuePasses {
   /// Sets the overlaps of the grid's blocks, for a cache in which each point is drawn once. Call it before
   /// scatter().
   void setOverlaps(std::vector<BlockOverlap> overlaps) { overlaps_ = std::move(overlaps); }
-  /// `see`: as SlabPass has it. Throws Error if the cache has no cell for a splat.
+  /// Scatters the values of a structured grid. `see`: SlabPass::see. Throws Error if the cache has no cell
+  /// for a splat.
   void scatter(const NodeReader& reader, std::function<void(const LoadedSlab&)> see = {});
-  /// Scatters the values of an unstructured grid, after its survey(); rank 0 makes all its splats.
+  /// Scatters the values of an unstructured grid, after its survey(). Rank 0 alone makes the splats.
   void scatter(SplatOrigin& origin);
   void mergeSeams();
-  /// Empty, or a warning that at some thin walls the values are means of both sides: when the geometry was made the
-  /// values of both were the same there, or an earlier program has made it. Call it after mergeSeams().
+  /// A warning if values at some thin walls are means of both sides, else empty. They are if both sides had
+  /// equal values when the geometry was made, or if an older version of the program made it. Call it after
+  /// mergeSeams().
   const std::string& warningOfWalls() const { return warning_of_walls_; }
   /// `references`: what the values are predicted from; may be null. Throws Error if the splats are not those
   /// of the cache.
@@ -102,8 +104,8 @@ struct FurtherFaces {
 };
 
 /// Writes the faces that faces.bin of the geometry has: outer faces, and the index planes inside of blocks
-/// that a conversion was asked for. Returns nothing, and writes no file, where there is no faces.bin. Reads
-/// the faces' slabs of the grid once more. Throws Error as writeGridFaces().
+/// that `convert --surface` has kept. Returns nullopt and writes nothing if there is no faces.bin. Reads the
+/// faces' slabs of the grid once more. Throws Error as writeGridFaces().
 std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryPlan& plan,
                                           Progress& progress);
 

@@ -49,14 +49,14 @@ class CoincidenceSweep {
   /// `sink` gets each set of nodes that coincide once no other node can join it. Two nodes coincide if they
   /// lie within the tolerance of both: 1e-3 of the node's spacing, or the rounding of its coordinates (4
   /// units in the last place, for coordinates of `coordinate_bytes` bytes) but then at most 0.4 of its
-  /// spacing, so that neighbours along a grid line never coincide, however thin the boundary layer, unless
-  /// they are one point.
+  /// spacing. So neighbours along a grid line never coincide, however thin the boundary layer, unless they
+  /// have one position.
   CoincidenceSweep(int coordinate_bytes, Sink sink);
 
   /// Adds the next node, in rising order of `along`. Returns the number of the node's set, counted from 0.
-  /// Numbers of sets that the sink has had are used again.
+  /// Once the sink has got a set, its number is used again.
   size_t add(const SweptNode& node);
-  /// Gives out all sets that are left.
+  /// Passes all remaining sets to the sink.
   void finish();
 
  private:

@@ -1,6 +1,7 @@
-// The temporary data of conversion: one file, in which each bucket's records form four chains of chunks. A chunk
-// is what one bucket's buffer held when it was full, so writes are large whatever order the splats come in,
-// and the memory of a bucket is its buffer and four offsets. Chains are equally long, so that as many threads can read a bucket.
+// The temporary data of conversion: one file, in which each bucket's records form four chains of chunks. A
+// chunk is what one bucket's buffer held when it was full, so writes are large whatever order the splats come
+// in, and the memory of a bucket is its buffer and four offsets. Chains are equally long: four threads can
+// read a bucket.
 //
 //    chunk:  checksum of what follows                           uint64
 //            offset of its chain's chunk before, or kNoChunk    uint64
@@ -8,9 +9,9 @@
 //            whole records
 //            zeros up to a multiple of kDirectAlignment
 //
-// It is written once and read once, and is larger than memory: it goes past the page cache. It is never
-// synced. The checksums are for an interrupted conversion that goes on with a file of which the disk may have
-// lost a part.
+// It is written once, read once, and larger than memory, so it bypasses the page cache. It is synced only if
+// another machine will read it, so the disk may lose a part of it in a power failure. A conversion that is
+// resumed finds that by the checksums.
 #pragma once
 
 #include <array>
@@ -32,7 +33,7 @@ class LostBuckets : public Error {
   using Error::Error;
 };
 
-/// The chains that reading a file again takes, beside the file.
+/// The state that another process needs, besides the file, to read it.
 struct BucketChains {
   static constexpr size_t kCount = 4;  // of a bucket
   static constexpr uint64_t kNoChunk = UINT64_MAX;
@@ -72,18 +73,18 @@ class BucketFile {
   /// nothing can be appended. `sync`: another machine will read it.
   void close(bool sync = false);
 
-  /// Has the records of another rank's file, which has the same buckets, read as well. Call it after close().
-  /// That file stays. Throws as the second constructor does.
+  /// Adds the records of another rank's file, which has the same buckets, to those that are read. Call it
+  /// after close(). That file is not removed. Throws as the second constructor does.
   void join(const std::filesystem::path& path, BucketChains chains);
 
   /// The chains of this rank's own file.
   BucketChains chains() const;
   uint64_t bytes(uint32_t bucket) const;
-  /// All records of a bucket; the order is not to be relied on. Overwrites `out` and keeps its capacity.
+  /// Reads all records of a bucket, in no particular order. Overwrites `out` and keeps its capacity.
   void read(uint32_t bucket, std::vector<std::byte>& out) const;
-  /// The same, a chunk at a time, which is whole records.
+  /// Calls `use` with each chunk of a bucket; a chunk has whole records.
   void forEachChunk(uint32_t bucket, const std::function<void(std::span<const std::byte>)>& use) const;
-  /// The same of one of its chains, 0 to BucketChains::kCount - 1.
+  /// Calls `use` with each chunk of one of its chains, 0 to BucketChains::kCount - 1.
   void forEachChunk(uint32_t bucket, size_t chain,
                     const std::function<void(std::span<const std::byte>)>& use) const;
 

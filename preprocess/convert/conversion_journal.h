@@ -63,7 +63,7 @@ std::unique_ptr<BucketFile> openScattered(const std::filesystem::path& file, con
 
 /// Writes the sample to a new file in the scratch folder, and names it for the journal.
 void writeSample(const std::filesystem::path& scratch, ScatteredSplats& splats);
-/// Reads the sample that a journal names. Throws Error if it is not as it was written.
+/// Reads the sample that a journal names. Throws Error if the file is missing or has changed.
 void readSample(const std::filesystem::path& scratch, ScatteredSplats& splats);
 
 inline constexpr const char* kJournalName = "journal";
@@ -88,7 +88,7 @@ struct ConversionJournal {
   std::optional<ScatteredSplats> splats;
 };
 
-/// The journal as bytes, and back: none if they are not what this program has written.
+/// The journal as bytes, and back: nullopt unless this version of the program has written them.
 std::string journalText(const ConversionJournal& journal);
 std::optional<ConversionJournal> journalFrom(const std::string& bytes);
 

@@ -37,7 +37,8 @@ namespace curvisplat {
 /// unless another conversion is to go on with them.
 class ScratchFolder {
  public:
-  /// How names of temporary folders for a cache begin: so much of its name that what follows fits, too.
+  /// Prefix of the names of a cache's temporary folders: its own name, cut so that what follows still fits
+  /// within the 255 bytes of a file name.
   static std::string beginOfName(const std::filesystem::path& cache);
   /// A name that no other process uses: `parent`/`name`.<process number>.<n>
   static std::filesystem::path newPath(const std::filesystem::path& parent, const std::string& name);
@@ -58,21 +59,21 @@ class ScratchFolder {
   bool leave_ = false;
 };
 
-/// Rank 0's `folder`, on a file system that all ranks share, at every rank: an absolute path. All have to
-/// call it. Throws Error at a rank that does not see it.
+/// Returns at every rank the absolute path of rank 0's `folder`, on a file system that all ranks share. All
+/// ranks call it. Throws Error at a rank that does not see the folder.
 std::filesystem::path sharedFolder(const std::filesystem::path& folder, Ranks& ranks);
 
-/// Makes an empty folder for this rank's own temporary files in `shared`, which is that folder where it is alone; returns when
-/// all ranks have theirs. All have to call it. Throws Error if it cannot.
+/// Makes an empty folder in `shared` for this rank's own temporary files; a single process uses `shared`
+/// itself. Returns when all ranks have theirs. All ranks call it. Throws Error if the folder cannot be made.
 std::filesystem::path makeFolderOfRank(const std::filesystem::path& shared, Ranks& ranks);
 
-/// Removes this rank's folder, and the shared one if it is empty: rank 0, if it failed, could not remove a folder in which
-/// others still wrote, so the last one does.
+/// Removes this rank's folder, and the shared one if it is empty: when rank 0 fails, others still write into
+/// the shared folder, so the last rank has to remove it.
 void removeFolderOfRank(const std::filesystem::path& own, const std::filesystem::path& shared) noexcept;
 
 /// How to treat an unfinished conversion to the same output.
 enum class Unfinished {
-  kRefuse,  // it is an error, if there is something to lose
+  kRefuse,  // an error, if finished work would be lost
   kResume,
   kRemove,
 };
@@ -103,13 +104,13 @@ class ConversionWorkspace {
   const std::filesystem::path& scratch() const { return scratch_->path(); }
 
   void noteSplats(ScatteredSplats splats);
-  /// Forgets the splats on disk: LostBuckets says that they are damaged.
+  /// Forgets the splats on disk, after LostBuckets: their file is missing or damaged.
   void forgetSplats();
 
-  /// Bytes that the partial folder takes already, which need no further disk space.
+  /// Bytes of the files in the partial folder; the rest of the cache needs that much less disk space.
   uint64_t bytesInPartial() const;
 
-  /// Leaves the folders for a later conversion if they are worth it. Returns whether they are.
+  /// Leaves the folders for a later conversion if they hold splats or bricks. Returns whether they do.
   bool leaveForResuming();
   /// Removes the files of a conversion that was killed after its cache was in place and before
   /// clearFinished(), and returns the facts of that conversion; nullopt if there is none.
@@ -128,7 +129,7 @@ class ConversionWorkspace {
 };
 
 /// Estimates the disk space that the conversion will need, from a sample that is converted within `folder`, a
-/// new one in the conversion's own. nullopt: that is not known. Throws Interrupted.
+/// new one in the conversion's own. nullopt: unknown. Throws Interrupted.
 using EstimateNeeds = std::function<std::optional<DiskNeeds>(const std::filesystem::path& folder)>;
 
 /// A conversion that has not begun its passes, or takes up what an interrupted one has left in its folders.
@@ -137,7 +138,7 @@ struct UncheckedConversion {
   const SplatOrigin& origin;
   uint64_t nodes;
   const ConversionWorkspace& workspace;
-  const EstimateNeeds& estimate;  // called only where the most that it may need does not fit; may be empty
+  const EstimateNeeds& estimate;  // called only if the upper bound of its needs does not fit; may be empty
 };
 
 /// Checks the space on disk before the first pass. Throws Error if the disks have too little space, unless

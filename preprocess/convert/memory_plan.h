@@ -50,11 +50,11 @@ struct MemoryPlan {
   /// has.
   static MemoryPlan ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads);
 
-  /// The cap_bytes from which on a plan's seam_bytes is at least this.
+  /// The smallest cap_bytes with which a plan's seam_bytes is at least this.
   static uint64_t capForSeams(uint64_t seam_bytes);
-  /// The cap_bytes from which on a plan's overlap_bytes is at least this.
+  /// The smallest cap_bytes with which a plan's overlap_bytes is at least this.
   static uint64_t capForOverlaps(uint64_t overlap_bytes);
-  /// The cap_bytes from which on a plan's mesh_bytes is at least this.
+  /// The smallest cap_bytes with which a plan's mesh_bytes is at least this.
   static uint64_t capForMesh(uint64_t mesh_bytes);
 
   /// The memory that the search for overlaps may take.
@@ -64,13 +64,13 @@ struct MemoryPlan {
   /// its block; `nodes`: its nodes along i.
   void requireRow(const std::string& block, uint64_t nodes, uint64_t bytes) const;
 
-  /// Throws Error that names a sufficient limit if cutting the grid's faces into patches takes more than there is.
+  /// Throws Error that names a sufficient limit if cutting the grid's faces into patches takes more than the
+  /// plan has.
   void requireFaces(uint64_t bytes) const;
 
-  /// Makes slabs and buckets no larger than a grid of `samples` needs. Then one is read while another is
-  /// worked on, and memory is used again instead of being taken from the system, at a page fault for every 4
-  /// KiB. Also leaves memory for the index of very many samples. Throws Error that names a sufficient limit
-  /// if there is none left.
+  /// Makes slabs and buckets no larger than a grid of `samples` needs. Then one can be read while another is
+  /// processed, and memory is reused: new memory costs a page fault for every 4 KiB. Also leaves memory for
+  /// the index of very many samples. Throws Error that names a sufficient limit if none is left.
   void suit(uint64_t samples, size_t variables);
   /// Lowers what `limits` sets.
   void limitTo(const TestLimits& limits, size_t variables);

@@ -20,18 +20,18 @@
 
 namespace curvisplat {
 
-/// Reads all nodes once. Memory: the slabs. Throws Error if no node is there, or if the grid is larger or
-/// smaller than single precision can say.
+/// Reads all nodes once. Memory: the slabs. Throws Error if all nodes are blanked, or if the grid is too
+/// large or too small for single precision.
 ///
-/// Where there are several ranks, each reads a share of the nodes, and all get the result; the sample is of the share. Cells are read by every
-/// rank as a whole.
+/// If there are several ranks, each reads a share of the nodes, and all get the result; the sample is of the
+/// share. Cell-centred grids are read whole by every rank.
 GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const SurveyExtras& extras,
                       Progress& progress, Ranks& ranks = oneRank());
 
-/// Throws Error if no sample is left, or if the grid is larger or smaller than single precision can say.
+/// Throws Error if all samples are blanked, or if the grid is too large or too small for single precision.
 void checkExtent(const GridSurvey& survey, const GridDescription& description);
 
-/// Values of scalars lie further apart than single precision can say the square of.
+/// The range of scalars is so wide that its square exceeds single precision.
 class WideScalars final : public Error {
  public:
   WideScalars(const std::string& text, std::vector<uint32_t> scalars)
@@ -51,13 +51,13 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
 std::vector<std::string> warningsOfValues(const GridSurvey& survey, const DataSource& source,
                                           std::span<const uint32_t> scalars);
 
-/// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for
-/// its scalar's sake is counted, which makes the plan no worse than a little uneven.
-/// `share`: those of a part of the grid's slabs.
+/// Counts the nodes that the grid does not blank, by cells of `root`. Reads coordinates alone: a node that
+/// only its scalar blanks is counted, which makes the plan a little uneven at worst. `share`: the part of the
+/// slabs to count.
 void countNodes(const GridSource& source, const RootCube& root, const SlabBuffers& slabs,
                 CountingGrid& counts, Progress& progress, const SlabShare& share = {});
 
-/// The same from a sample, without reading.
+/// Counts the nodes of a sample instead, without reading the grid.
 void countSample(const PositionSample& sample, const RootCube& root, CountingGrid& counts);
 
 /// The level to begin counting at: of voxels that nodes spread evenly over a box of `extent` would have to themselves. Nodes

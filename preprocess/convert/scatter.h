@@ -33,7 +33,7 @@ class RecordRouter {
       : tree_(&tree), file_(&file), contents_(tree.size()) {}
 
   void add(std::span<const std::byte> record, const RootPosition& position);
-  /// Sends what is gathered. To be called at the end.
+  /// Sends the records that are gathered. Call it at the end.
   void flush();
   /// [node of the tree]: what went to each leaf.
   std::vector<CellContents>& contents() { return contents_; }
@@ -56,7 +56,7 @@ struct SlabPass {
   std::function<void(const LoadedSlab&)>
       see;                        // each slab, in order, before its splats are made; may be empty
   BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
-  Ranks* ranks = &oneRank();      // of which each makes the splats of a share; the counts are the whole's
+  Ranks* ranks = &oneRank();      // each makes the splats of its share; the counts are of all
   ScatterNotes notes;             // of a scatter() without ranks
   SplatRules rules;
 };
@@ -76,12 +76,12 @@ struct SplatTarget {
   ValueSample* sample = nullptr;                  // what was routed is added
 };
 
-/// Routes all splats that the origin makes in scatter(). When it notes how far it has come, all splats until then are in
-/// the file and in the target's contents and sample.
+/// Routes all splats that the origin makes in scatter(). Whenever the origin notes its progress, all splats
+/// made so far are in the file, and in the target's contents and sample.
 ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, const ScatterNotes& notes,
                             Progress& progress);
 
-/// Routes those that it makes in finish(). Returns how many samples were merged into another one.
+/// Routes those that the origin makes in finish(). Returns how many samples were merged into another one.
 uint64_t scatterRest(SplatOrigin& origin, const SplatTarget& target, Progress& progress);
 
 }  // namespace curvisplat

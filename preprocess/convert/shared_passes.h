@@ -33,26 +33,26 @@ inline SlabShare shareOf(const Ranks& ranks) {
   return {ranks.rank(), ranks.count()};
 }
 
-/// The size of slabs of which each of several ranks gets about eight; at most `slab_bytes`, and as much as a row and its
-/// halo need.
+/// The size of slabs, in bytes, with which each of several ranks gets about eight; at most `slab_bytes`, at
+/// least what a row and its halo need.
 uint64_t slabBytesOfRanks(const NodeReader& reader, uint64_t slab_bytes, const Ranks& ranks);
 
-/// The plan of all: the smallest that any of them has of each thing, since they have to cut the grid and the
-/// buckets alike. Limit and threads stay each rank's own.
+/// The plan of all ranks, which must cut the grid and the buckets alike: of each number the smallest that any
+/// rank has. Limit and threads stay each rank's own.
 MemoryPlan commonPlan(MemoryPlan plan, Ranks& ranks);
 
-/// The survey of the whole, of each rank's survey of its share.
+/// Combines the ranks' surveys of their shares into one of the whole grid, at every rank.
 GridSurvey combinedSurvey(const GridSurvey& share, Ranks& ranks);
-/// Rank 0's survey, at every rank.
+/// Returns rank 0's survey at every rank.
 GridSurvey broadcastSurvey(const GridSurvey& survey, Ranks& ranks);
 
-/// Adds the counts of all other ranks to rank 0's, one rank's after the other's. Costs rank 0 the memory of
-/// one more grid's runs.
+/// Adds the counts of all other ranks to rank 0's, rank after rank, so that rank 0 holds the runs of only one
+/// other rank at a time.
 void sendCountsToFirst(CountingGrid& counts, Ranks& ranks);
 
-/// Rank 0's tree, without contents, at every rank.
+/// Returns rank 0's tree, without contents, at every rank.
 BucketTree broadcastTree(const BucketTree& tree, Ranks& ranks);
-/// [node of the tree]: the sums of all ranks' contents, at every rank.
+/// Replaces `contents`, [node of the tree], by the sums of all ranks' contents, at every rank.
 void sumContents(std::vector<CellContents>& contents, Ranks& ranks);
 
 /// Returns at rank 0 the chains of the other ranks' files, from rank 1 on.

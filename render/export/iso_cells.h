@@ -1,7 +1,8 @@
 // The cubes of a lattice that an isosurface goes through, in tiles of 32x32 columns of cubes, and the quads between them.
 //
-// The lattice is looked at as a picture: a column of its points is the ray of a pixel, along the view. So what is found is the field of
-// iso_field.h, to the bit the same for a point on the edge of two tiles. Any thread, a tile each.
+// The lattice is treated as a picture: a column of its points is the ray of a pixel. So the field is that of
+// iso_field.h, and a point on the edge of two tiles has the same bits in both, without which the mesh would
+// have gaps. Any thread, a tile each.
 #pragma once
 
 #include <array>
@@ -16,8 +17,8 @@ namespace curvisplat {
 /// The vertex of a cube that meets the surface.
 struct IsoVertex {
   glm::dvec3 at;     // in view axes, from the eye
-  glm::vec3 normal;  // to smaller values
-  float inside;      // below 0: behind a border of the data
+  glm::vec3 normal;  // towards smaller values
+  float inside;      // -1 to 1, in lengths of the splats; below 0: beyond a border of the data
 };
 
 struct IsoCells {
@@ -38,9 +39,11 @@ struct IsoLattice {
   uint64_t number(uint64_t i, uint64_t j, uint64_t k) const { return (j * size[0] + i) * size[2] + k; }
 };
 
-/// `splats` are sorted, have one value, and are seen in a parallel view whose depth origin is 0.
+/// Finds the cubes and quads of a tile. `splats`: sorted, of one isosurface, in a parallel view whose depth
+/// origin is 0.
 IsoCells isoCells(const IsoSplats& splats, size_t tile, const IsoLattice& lattice);
-/// The most memory that it takes.
+/// The bytes of memory that isoCells() takes at most, if a column meets the surface no more than eight times
+/// on average.
 uint64_t isoCellsBytes(const IsoSplats& splats, size_t tile, const IsoLattice& lattice);
 
 }  // namespace curvisplat

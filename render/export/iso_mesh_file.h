@@ -1,5 +1,6 @@
-// A triangle mesh written as it is made: vertices and triangles wait in nameless files beside the target until their numbers are known.
-// Binary .ply and .stl in floats; .vtp with raw appended data, positions in doubles. One thread.
+// A triangle mesh that is written while it is made. All formats begin with their counts, so vertices and
+// triangles wait in nameless files beside the target until all are there. Binary .ply and .stl in floats;
+// .vtp with raw appended data, positions in doubles. One thread.
 #pragma once
 
 #include <array>
@@ -20,7 +21,7 @@ class IsoMeshFile {
   /// Throws UsageError for another extension, Error if nothing can be written there.
   explicit IsoMeshFile(const std::filesystem::path& path);
 
-  /// Adds a vertex and returns its index. Throws Error if there are too many.
+  /// Adds a vertex, in world units, and returns its index. Throws Error if there are more than 2^31.
   uint32_t addVertex(const glm::dvec3& at, const glm::vec3& normal);
   void addTriangle(const std::array<uint32_t, 3>& corners);
   uint64_t vertices() const { return vertices_.count; }
@@ -35,7 +36,7 @@ class IsoMeshFile {
     explicit Spool(const ScratchFiles& scratch) : file(scratch) {}
     void add(const T& record);
     void flush();
-    /// Blocks of them in order.
+    /// Passes all records to `take`, in order, a block at a time.
     void read(const std::function<void(std::span<const T>)>& take);
 
     NamelessFile file;

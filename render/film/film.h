@@ -20,7 +20,7 @@ namespace curvisplat {
 /// The function and the cuts of a key frame, as far as it states them.
 struct KeyLook {
   std::optional<TransferFunctionDefinition> function = std::nullopt;  // with its opacity unit
-  std::optional<FunctionParts> parts = std::nullopt;  // that `function` is made of, to be written
+  std::optional<FunctionParts> parts = std::nullopt;  // what `function` was made from, for Film::toJson()
   std::optional<WorldBox> clip_box = std::nullopt;
   std::optional<std::vector<ClipPlane>> clip_planes = std::nullopt, slices = std::nullopt;
 
@@ -30,15 +30,16 @@ struct KeyLook {
 
 class Film {
  public:
-  /// The kinds of things that the film states, and so no option may.
+  /// The kinds of things that the film states; `render` refuses options for them.
   struct Stated {
     bool functions = false, clip_boxes = false, clip_planes = false, slices = false;
     bool any() const { return functions || clip_boxes || clip_planes || slices; }
   };
 
-  /// `looks`: of each key frame. All of them have functions, or none; planes and boxes that one lacks and another has are
-  /// none. `scalar`: that the functions are of; empty: not stated. `scale`: the data's scale (FrameOptions::scale) of the pictures
-  /// that the cameras are for; none: of any. Throws Error that names the key frame.
+  /// `looks`: one for each key frame. All have functions, or none has. Where one has a clip box, clip planes
+  /// or slices and another does not state them, that one has none. `scalar`: whose values the functions take;
+  /// empty: not stated. `scale`: the scale of the data (FrameOptions::scale) that the cameras are for;
+  /// nullopt: any. Throws Error that names the key frame.
   Film(CameraPath cameras, std::vector<KeyLook> looks, std::string scalar, const std::string& name,
        std::optional<glm::dvec3> scale = std::nullopt);
   /// Reads the JSON file that tools/REFERENCE.md describes. Throws Error with the file, the key frame and the field.
@@ -50,16 +51,19 @@ class Film {
   const std::string& scalar() const { return scalar_; }
   const std::optional<glm::dvec3>& scale() const { return scale_; }
   const Stated& stated() const { return stated_; }
-  /// The film for pictures of another scale: each camera keeps the place of the data that it looks at. Itself, if it is for any.
+  /// The film with its cameras moved for data of this scale: each still looks at the same place of the data.
+  /// A film that is for any scale is returned as it is.
   Film inScale(const glm::dvec3& scale) const;
   /// Whether any key frame has another function than the one before.
   bool functionsChange() const { return functions_change_; }
 
-  /// The time of a frame of `frames`, spread evenly: the last is at the end.
+  /// The time of frame `frame`, from 0, of `frames` that are spread evenly from the first key frame to the
+  /// last.
   double timeOf(uint64_t frame, uint64_t frames) const;
-  /// The function and the cuts at a time: at a key frame exactly what that states. Functions are blended(); corners of boxes and points of
-  /// planes move on lines, normals turn on great circles. If only one of two key frames has a box, or they have not
-  /// equally many planes, what the earlier has stays until the later. `time` is clamped to the film.
+  /// The function and the cuts at a time, which is clamped to the film; at a key frame exactly what that
+  /// states. Between two, functions are blended(), corners of boxes and points of planes move on lines, and
+  /// normals turn on great circles. If only one of the two has a box, or their numbers of planes differ, the
+  /// earlier one's stay until the later.
   KeyLook lookAt(double time) const;
 
  private:

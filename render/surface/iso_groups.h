@@ -27,7 +27,7 @@ struct IsoGroup {
   std::span<const double> values = {};
   std::span<const std::optional<glm::vec3>> own_colours = {};  // as `values`, or empty
 
-  /// The colour that one has of its own, if it has one.
+  /// The colour that isosurface n was given; nullopt: it has the function's.
   std::optional<glm::vec3> ownColour(size_t n) const {
     return own_colours.empty() ? std::nullopt : own_colours[n];
   }

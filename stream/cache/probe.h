@@ -15,11 +15,11 @@ namespace curvisplat {
 struct ProbeVariable {
   float mean = 0;  // of the sample's splat, at its centre
   float value =
-      0;  // at the point: what the splats that reach it say by their means and slopes, the nearer the more
+      0;  // at the point: mean of the linear fields of the splats that reach it, weighted by nearness
 };
 
-/// A sample of a block whose splat reaches a point, by its indices in the files' grid: where a cache was made of cut
-/// cells (Refinement), the nearest node, or the cell that was cut.
+/// A sample of a block whose splat reaches a point, with its indices in the files' grid. Where the conversion
+/// cut cells (Refinement), it is the nearest node, or the cell that was cut. `distance`: as in ProbeResult.
 struct ReachingSample {
   uint32_t block = 0;
   uint64_t i = 0, j = 0, k = 0;
@@ -36,12 +36,13 @@ struct ProbeResult {
   double distance = 0;     // |A⁻¹(x - μ)|: 0 at the splat's centre, 1.556 at the edge of its support
   std::vector<ProbeVariable> variables;  // in the order of the argument
   std::vector<ReachingSample> near;      // the nearest of each block, the nearest block first
-  bool is_beyond = false;  // the borders where the cells of these end, by more than a quarter of a cell
+  bool is_beyond = false;  // more than a quarter of a cell beyond the border of every sample in `near`
 };
 
-/// [point]: the leaf splat with the smallest `distance` from it; nullopt if no splat's support contains the point. Where a scalar is linear, its value
-/// is exact; none is outside of the manifest's range. Decodes the leaves whose splats may reach a point, each once. `variables`: indices in
-/// manifest().variables. Throws as CacheReader.
+/// [point]: the leaf splat with the smallest `distance` from it; nullopt if no splat's support contains the
+/// point. Values are exact where the scalar is linear, and clamped to the manifest's range. Decodes the
+/// leaves whose splats may reach a point, each once. `variables`: indices in manifest().variables. Throws as
+/// CacheReader.
 std::vector<std::optional<ProbeResult>> probeAll(const CacheReader& reader, std::span<const size_t> variables,
                                                  std::span<const glm::dvec3> points);
 std::optional<ProbeResult> probe(const CacheReader& reader, std::span<const size_t> variables,

@@ -4,7 +4,7 @@
 //
 //     block u32 | side u32 | first node i, j, k u64 | last node i, j, k u64        56 bytes
 //
-// A reader of splats need not know them, but a program that adds scalars has to make the same splats.
+// Drawing does not need them. Adding scalars does: it has to make the same splats.
 #pragma once
 
 #include <array>

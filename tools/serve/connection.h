@@ -1,7 +1,7 @@
 // One connection of the server: a request over HTTP, which is answered or becomes a WebSocket.
 //
-// All members are for the server's thread, that of the io_context. A connection lives as long as an operation of it is
-// under way. What it needs of the server is a ConnectionHost.
+// Only the server's thread, which runs the io_context, calls its members. A connection keeps itself alive
+// while one of its operations is pending. It sees the server as a ConnectionHost.
 #pragma once
 
 #include <boost/asio/steady_timer.hpp>
@@ -29,7 +29,8 @@ class ConnectionHost {
  public:
   virtual ~ConnectionHost() = default;
   virtual const ServerOptions& options() const = 0;
-  /// A new viewer, or nullptr if there are as many as may be. Its messages go to `connection`, as long as that lives.
+  /// Makes a viewer; returns nullptr at the limit of viewers. Its messages go to `connection` while that
+  /// lives.
   virtual std::unique_ptr<RemoteViewer> newViewer(const std::shared_ptr<Connection>& connection) = 0;
   /// Ends a viewer, without waiting for it.
   virtual void endViewer(std::unique_ptr<RemoteViewer> viewer) = 0;
@@ -45,9 +46,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   /// Begins to read the request.
   void start();
-  /// Sends a message to the page. Closes the connection if more wait than its line can take.
+  /// Queues a message to the page. Drops the connection if the queue is full: the page reads too slowly.
   void send(std::string message, bool is_text);
-  /// Ends it at once.
+  /// Closes the socket at once, without saying goodbye.
   void drop();
 
  private:
@@ -71,7 +72,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   ConnectionHost& host_;
   boost::beast::websocket::stream<boost::beast::tcp_stream> socket_;
-  boost::asio::steady_timer writing_;  // how long a part of a message may take
+  boost::asio::steady_timer writing_;  // limits the time that sending a part of a message takes
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   boost::beast::http::response<boost::beast::http::string_body> response_;

@@ -12,8 +12,8 @@ struct ImDrawData;
 
 namespace curvisplat {
 
-/// Two frames that look the same have the same number, and others almost certainly not, as long as no
-/// texture's contents change: of those it knows only which are used.
+/// A number that is equal for frames that look the same and almost certainly differs for others. It knows
+/// which textures a frame uses, but not when their contents change.
 uint64_t appearanceOf(const ImDrawData& frame);
 
 /// Replaces Dear ImGui's fonts by DejaVu Sans, or its own bitmap font where that is not installed, `pixels`
@@ -49,8 +49,9 @@ struct DraggedEnds {
   float speed, lowest, highest;
   const char *low_format, *high_format;
 };
-/// Draws a slider from `lowest` to `highest`. Ctrl and a click, or a double click, open it for typing; what the first of two clicks has changed
-/// is changed back. Returns whether the value has changed. `label` is Dear ImGui's, `format` printf's, `flags` ImGuiSliderFlags.
+/// Draws a slider from `lowest` to `highest`. Ctrl and a click, or a double click, open it for typing; a
+/// double click undoes the change that its first click made. Returns whether the value has changed. `label`
+/// is Dear ImGui's, `format` printf's, `flags` ImGuiSliderFlags.
 bool slider(const char* label, float& value, float lowest, float highest, const char* format, int flags);
 bool slider(const char* label, double& value, double lowest, double highest, const char* format, int flags);
 bool slider(const char* label, int& value, int lowest, int highest, const char* format, int flags);

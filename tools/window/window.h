@@ -1,7 +1,7 @@
 // A window with an OpenGL context and Dear ImGui, and a texture that shows a picture in it.
 //
-// Everything except Window::wake() is for the main thread. A frame is shown only if it looks otherwise than
-// the one before, which takes a checksum of what it draws.
+// Everything except Window::wake() is for the main thread. A frame is shown only if it looks different from
+// the one before; a checksum of its drawing commands tells.
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -62,7 +62,7 @@ class Window {
   /// Ends a wait(). Any thread, during the window's lifetime.
   static void wake();
 
-  /// Begins and ends a Dear ImGui frame; endFrame() shows it if it looks otherwise than the one that is
+  /// Begins and ends a Dear ImGui frame; endFrame() shows it if it looks different from the one that is
   /// shown.
   void beginFrame();
   /// Closes what an exception has left open of this frame's windows, menus and lists.
@@ -86,8 +86,8 @@ class Window {
   /// Keys that Dear ImGui has been shown since the last call, so that all earlier clicks and letters have
   /// had their effect. While text is typed, only F1 and those with Control that do not edit.
   std::vector<Key> takeKeys();
-  /// Holds what is typed and clicked back until after Dear ImGui's next frame: for a text field that gets
-  /// the focus only then.
+  /// Holds keys and clicks back until after Dear ImGui's next frame, for a text field that gets the focus
+  /// only then.
   void holdInput() { holds_input_ = true; }
   /// Whether a key, a button, the mouse or the wheel was used since the last call.
   bool takeInput();
@@ -113,7 +113,7 @@ class Window {
   /// Keeps clicks and drags that begin in this rectangle from the picture under it: call in every frame that
   /// it is there.
   void cover(const Rectangle& place) { covers_.push_back(place); }
-  /// The same of the current Dear ImGui window.
+  /// Keeps those in the current Dear ImGui window from the picture.
   void coverCurrent();
   /// Clicks of the left button on the picture without a movement, since the last call; Dear ImGui units.
   std::vector<glm::dvec2> takeClicks() { return std::exchange(clicks_, {}); }
@@ -129,14 +129,14 @@ class Window {
   /// Height of a menu bar: a line with the space that a widget has around it.
   double lineHeight() const { return line_height_; }
   void setTitle(const std::string& title);
-  /// Makes text and widgets larger than the display asks for. 0.5 to 4; between frames.
+  /// Scales text and widgets by 0.5 to 4 times what the display asks for. Call it between frames.
   void setTextScale(double scale);
   void setLightTheme(bool light);
 
   void setClipboard(const std::string& text);
   const GlFunctions& gl() const { return *gl_; }
-  /// Another context, for a painter whose pictures are shown without a copy. It is made now, if it is wanted; what refuses it
-  /// is what makeContext() throws.
+  /// Lends a second context to a painter, whose pictures are then shown without a copy. `wants_context`:
+  /// makes it now, on the main thread. If that fails, GlSharing::makeContext() throws the reason.
   GlSharing& sharing(bool wants_context);
   /// Whether the processor draws the window.
   bool isSoftware() const;

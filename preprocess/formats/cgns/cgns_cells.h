@@ -15,11 +15,12 @@ namespace curvisplat {
 /// Any number of threads may read.
 class CgnsCells {
  public:
-  /// Looks at the types of all elements of MIXED sections. `file` must outlive it. Throws Error if the zone is damaged.
+  /// Reads the types of all elements of MIXED sections. `file` must outlive it. Throws Error if the zone is
+  /// damaged.
   CgnsCells(const CgnsFile& file, const CgnsZone& zone, const ListSpools& spools);
 
   uint64_t cells() const { return cells_; }
-  /// Cells of which kind there are; `others`: elements of MIXED sections that are not solid.
+  /// Numbers of cells, and of those above order 1; `others`: elements of MIXED sections that are not solid.
   struct Counts {
     uint64_t solid = 0, curved = 0, others = 0;
   };
@@ -29,7 +30,7 @@ class CgnsCells {
   void read(uint64_t first, uint64_t count, MeshCells& out) const;
 
  private:
-  /// A section's cells, or those that only the faces know of.
+  /// The cells of a section; or, without a section, those that only the faces name (ParentElements).
   struct Run {
     const CgnsSection* section = nullptr;
     uint64_t first = 0, cells = 0;  // in the zone

@@ -68,7 +68,8 @@ class CgnsHdf5 {
   Hdf5Group open(const std::string& node_path) const;
   Data openData(const Hdf5Group& group, const std::string& node_path) const;
   void checkNumbers(const Data& data, const std::string& node_path) const;
-  /// Lists the nodes below, and their shapes, as far as there are not too many.
+  /// Visits at most `most` of the nodes below, and their shapes, to try HDF5 on them in a child process.
+  /// Ignores errors, which may be of nodes that nobody needs.
   void visitAll(const CgnsNode& node, int depth, size_t& most) const;
   void count(const Hdf5Group& group, size_t nodes, const std::string& node_path) const;
   void readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, void* to) const;
