@@ -157,6 +157,9 @@ std::string describe(const CLI::App& app, const CLI::App* command, const CLI::Pa
   }
   if (std::regex_match(text, found, std::regex("(\\S+): At least (\\d+) required but received (\\d+)")))
     return fmt::format("{} needs {} values, found {}", found[1].str(), found[2].str(), found[3].str());
+  if (std::regex_match(text, found, std::regex("(\\S+): At Most (\\d+) required but received (\\d+)")))
+    return fmt::format("{} takes {}, found {}", found[1].str(),
+                       found[2] == "1" ? "one value" : found[2].str() + " values", found[3].str());
   if (std::regex_match(text, found,
                        std::regex("(\\S+): Value (.*) not in range \\[?(\\S+) (?:to|-) ([^\\]]+)\\]?")))
     return fmt::format("{} '{}': expected a number from {} to {}", found[1].str(), found[2].str(),
@@ -188,12 +191,19 @@ void refuseOptionsAsValues(CLI::App& app) {
     refuseOptionsAsValues(*command);
 }
 
-/// CLI11 takes the next word where nothing follows "=".
+/// CLI11 takes the next word where nothing follows "=", and an option that is followed by an empty word for one that was not given.
 void refuseEmptyValues(std::span<const char* const> words) {
+  std::string_view before;
   for (const std::string_view word : words) {
+    if (word.empty() && before.size() > 1 && before.starts_with('-') && before != "--")
+      throw UsageError("{}: needs a value (found '', as of a variable of the shell that is not set)", before);
+    if (word.empty())
+      throw UsageError(
+          "an argument is empty, as of a variable of the shell that is not set; expected a name");
     if (word == "--") return;
     if (word.starts_with("--") && word.find('=') + 1 == word.size())
       throw UsageError("{}: needs a value (found nothing behind '=')", word.substr(0, word.size() - 1));
+    before = word;
   }
 }
 

@@ -157,6 +157,7 @@ std::string closestTo(std::string_view word, std::span<const std::string> candid
     const bool is_closer_in_a_tie =
         letters == least && !best.empty() && beginsWith(candidate, word) && !beginsWith(best, word);
     if (letters >= least && !is_closer_in_a_tie) continue;
+    if (letters >= std::max(word.size(), candidate.size())) continue;  // they share no letter
     least = letters;
     best = candidate;
   }

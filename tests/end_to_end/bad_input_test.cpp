@@ -201,10 +201,14 @@ TEST_F(BadInput, InvalidOptionValues) {
           "--blank 'none': is not a number, or is too large");
   refused({"convert", file("scene.xyz"), "--threads", "1025"},
           "--threads '1025': expected a number from 0 to 1024");
-  refused({"convert", file("scene.xyz"), "--threads", ""}, "--threads ''");
+  refused({"convert", file("scene.xyz"), "--threads", ""}, "--threads: needs a value (found ''");
+  refused({"convert", file("scene.xyz"), "--scalar", "", "-o", file("a.splats")}, "--scalar: needs a value");
+  refused({"render", "", "-o", file("a.png")}, "an argument is empty");
+  refused({"render", file("whole.splats"), "--tf", "viridis", "--tf", "magma"},
+          "--tf takes one value, found 2");
   refused({"convert", file("scene.xyz"), "-o"}, "--output needs a value");
   expectRefused(
-      {"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"), "--memory", "1K"}, 1,
+      {"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"), "--memory", "1K"}, 2,
       {"--memory 1 KiB: conversion of 1 scalar takes at least 160 MiB"});
   expectRefused({"render", file("whole.splats"), "-o", file("a.png"), "--memory", "1K"}, 2,
                 {"--memory 1 KiB: too little"});

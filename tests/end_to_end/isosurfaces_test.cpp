@@ -282,7 +282,7 @@ TEST_F(Isosurfaces, TheProgramDrawsThemAndRefusesWrongUsage) {
     Words options;
     int status;
     std::string words;
-  } refused[] = {{{"--iso", "7"}, 1, "--iso 7: no isosurface: the values of f go from "},
+  } refused[] = {{{"--iso", "7"}, 2, "--iso 7: no isosurface: the values of f go from "},
                  {{"--iso", "x"}, 2, "--iso"},
                  {{"--iso-opacity", "0.5"}, 2, "--iso-opacity needs an isosurface: --iso VALUE"},
                  {{"--iso", "0.5", "--iso-opacity", "2"}, 2, "--iso-opacity 2: expected a number above 0"},

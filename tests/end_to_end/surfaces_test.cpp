@@ -367,7 +367,7 @@ TEST_F(SurfaceOptions, RefusesWrongUsage) {
       {{"--surface-colour", "#ff0000"}, 2, "--surface-colour needs a surface: --surface FILE"},
       {{"--surface", sphere, "--surface-colour", "red"},
        2,
-       "--surface-colour red: expected dark, white, black"},
+       "--surface-colour red: expected #rrggbb such as #e07020, white or black"},
       {{"--surface", cut}, 1, cut + ": is truncated"},
       {{"--surface", file("none.stl")}, 1, file("none.stl")}};
   for (const auto& [options, status, words] : refused) {

@@ -469,7 +469,7 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
     int status;
     std::string words;
   } refused[] = {
-      {{"--opacity-by", "x"}, 1, "--opacity-by: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
+      {{"--opacity-by", "x"}, 2, "--opacity-by: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
       {{"--opacity-range", "0,1"}, 2, "--opacity-range 0,1: needs --opacity-by NAME"},
       {{"--opacity-by", "s0", "--opacity-range", "1,1"},
        2,
@@ -483,9 +483,9 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
       {{"--iso", "s0=0.5,s1=0.5"},
        2,
        "--iso s0=0.5,s1=0.5: has two scalars; give --iso NAME=VALUE,... once for each"},
-      {{"--iso", "x=0.5"}, 1, "--iso x=0.5: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
-      {{"--iso", "s1=7"}, 1, "--iso 7: no isosurface: the values of s1 go from "},
-      {{"--opacity-by", "s0", "--iso", "7"}, 1, "--iso 7: no isosurface: the values of s0 go from "},
+      {{"--iso", "x=0.5"}, 2, "--iso x=0.5: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
+      {{"--iso", "s1=7"}, 2, "--iso 7: no isosurface: the values of s1 go from "},
+      {{"--opacity-by", "s0", "--iso", "7"}, 2, "--iso 7: no isosurface: the values of s0 go from "},
       {{"--opacity-by", "s0", "--opacity-tf", "viridis"},
        2,
        "--opacity-tf viridis: expected a ParaView preset"}};

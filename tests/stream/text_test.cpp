@@ -114,6 +114,11 @@ TEST(Suggestion, OfNamesThatBeginAlikeTheShortest) {
   EXPECT_EQ(didYouMean("density", names), "");
 }
 
+TEST(Suggestion, SharesALetter) {
+  EXPECT_EQ(closestTo("T", std::vector<std::string>{"i", "j"}), "");
+  EXPECT_EQ(closestTo("T", std::vector<std::string>{"i", "t"}), "t");
+}
+
 TEST(Calendar, ConvertsTimesToOtherUnits) {
   struct Case {
     double time;

@@ -336,8 +336,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   printSteps(reader);
   for (size_t v = 0; v < m.variables.size(); ++v) {
     const auto [means, slopes] = storedErrors(reader, v);
-    printLine("scalar     {} {}: {}, rounded within {:.1e}", m.variables[v].name,
-              m.variables[v].unit.empty() ? "" : fmt::format("[{}]", m.variables[v].unit),
+    printLine("scalar     {}{}: {}, rounded within {:.1e}", m.variables[v].name,
+              m.variables[v].unit.empty() ? "" : fmt::format(" [{}]", m.variables[v].unit),
               rangeText(m.variables[v].min, m.variables[v].max, 6), means.largest);
     fmt::print(
         "           errors of stored values: at most {:.1e}, typically {:.1e}; of changes within a sample: "

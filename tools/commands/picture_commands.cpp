@@ -99,7 +99,7 @@ void list(bool only_safe) {
     fmt::print("{}\n", title);
     for (const PublishedMap& map : builtInMaps())
       if (map.category == category && (map.colour_blind_safe || !only_safe))
-        fmt::print("  {:<22}{:<12}{}\n", map.name, map.source,
+        fmt::print("  {:<22}{:<22}{}\n", map.name, map.source,
                    map.colour_blind_safe ? "colour-blind safe" : "");
   }
 }

@@ -41,12 +41,6 @@ double parseCurveOpacity(const std::string& text) {
   return opacity;
 }
 
-glm::vec3 parseCurveColour(const std::string& text) {
-  if (text == "transparent")
-    throw UsageError("--lines-colour transparent: give #rrggbb, and --lines-opacity");
-  return glm::vec3(parseBackground("--lines-colour", text));
-}
-
 /// The cache and the globe that lines are placed in, and whether their times are the series'.
 struct Place {
   const CacheReader& cache;
@@ -194,7 +188,7 @@ void checkCurveArguments(const CurveArguments& arguments) {
   parseWidth("--point-size", arguments.point_size);
   parseCurveOpacity(arguments.opacity);
   if (arguments.time) parseTimeShown(*arguments.time);
-  for (const std::string& colour : arguments.colours) parseCurveColour(colour);
+  for (const std::string& colour : arguments.colours) parseColour("lines", colour);
   const CurveArguments otherwise;
   if (arguments.lines.empty() && arguments.line_width != otherwise.line_width)
     throw UsageError("--line-width needs lines: --lines FILE");
@@ -234,7 +228,7 @@ std::vector<Curves> curvesOf(const CurveArguments& arguments, const CacheReader&
       curves.in_pixels = width.in_pixels;
       curves.opacity = parseCurveOpacity(arguments.opacity);
       if (!arguments.colours.empty())
-        curves.colour = parseCurveColour(arguments.colours[arguments.colours.size() == 1 ? 0 : n]);
+        curves.colour = parseColour("lines", arguments.colours[arguments.colours.size() == 1 ? 0 : n]);
     }
   if (arguments.by.empty() || arguments.by == drawn || all.empty())
     return curvesAt(std::move(all), cache.time());

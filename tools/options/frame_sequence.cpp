@@ -237,7 +237,7 @@ std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const Cach
   if (step >= series.steps.size())
     throw UsageError("--step {}: is out of range; {} has {}", step, cache.cachePath().string(),
                      series.steps.size() == 1
-                         ? "one time step; `convert --steps all` makes a cache of all that the files have"
+                         ? "one time step, 0; of files with more, `convert --steps all` makes a cache of all"
                          : fmt::format("steps 0 to {}", series.steps.size() - 1));
   return {{step}};
 }

@@ -22,7 +22,7 @@ size_t variableOf(const CacheReader& cache, const OpacityArguments& arguments) {
   try {
     return cache.variableNamed(arguments.by.scalar);
   } catch (const UsageError& error) {
-    throw Error("--opacity-by: {}", error.what());
+    throw UsageError("--opacity-by: {}", error.what());
   }
 }
 

@@ -136,21 +136,39 @@ uint64_t parseCount(std::string_view option, std::string_view text) {
   return count;
 }
 
-glm::vec4 parseBackground(std::string_view option, std::string_view text) {
+namespace {
+
+/// "dark", "white", "black" or "#rrggbb", opaque.
+std::optional<glm::vec4> opaqueColour(std::string_view text) {
   if (text == "dark") return kDefaultBackground;
-  if (text == "white") return {1, 1, 1, 1};
-  if (text == "black") return {0, 0, 0, 1};
-  if (text == "transparent") return {0, 0, 0, 0};
+  if (text == "white") return glm::vec4(1);
+  if (text == "black") return glm::vec4(0, 0, 0, 1);
   uint32_t rgb = 0;
   if (text.size() == 7 && text[0] == '#') {
     const auto [end, error] = std::from_chars(text.data() + 1, text.data() + 7, rgb, 16);
     if (error == std::errc() && end == text.data() + 7)
-      return {static_cast<float>(rgb >> 16 & 255) / 255, static_cast<float>(rgb >> 8 & 255) / 255,
-              static_cast<float>(rgb & 255) / 255, 1};
+      return glm::vec4(static_cast<float>(rgb >> 16 & 255) / 255, static_cast<float>(rgb >> 8 & 255) / 255,
+                       static_cast<float>(rgb & 255) / 255, 1);
   }
+  return std::nullopt;
+}
+
+}  // namespace
+
+glm::vec4 parseBackground(std::string_view option, std::string_view text) {
+  if (text == "transparent") return {0, 0, 0, 0};
+  if (const auto colour = opaqueColour(text)) return *colour;
   const std::vector<std::string> names{"dark", "white", "black", "transparent"};
   throw UsageError("{} {}: expected dark, white, black, transparent or #rrggbb{}", option, text,
                    didYouMean(text, names));
+}
+
+glm::vec3 parseColour(std::string_view of, std::string_view text) {
+  if (text == "transparent")
+    throw UsageError("--{0}-colour transparent: give #rrggbb, and --{0}-opacity", of);
+  const auto colour = opaqueColour(text);
+  if (!colour) throw UsageError("--{}-colour {}: expected #rrggbb such as #e07020, white or black", of, text);
+  return glm::vec3(*colour);
 }
 
 Backend parseBackend(std::string_view text) {

@@ -39,6 +39,8 @@ uint64_t parseMemory(std::string_view option, std::string_view text);
 uint64_t parseCount(std::string_view option, std::string_view text);
 /// "dark" (kDefaultBackground), "white", "black", "transparent" or "#rrggbb". Returns premultiplied red, green, blue, alpha.
 glm::vec4 parseBackground(std::string_view option, std::string_view text);
+/// The value of --OF-colour: "#rrggbb", "white", "black" or "dark", without alpha. "transparent" is refused: --OF-opacity says that.
+glm::vec3 parseColour(std::string_view of, std::string_view text);
 
 /// The value of --backend: "auto", "osmesa", "egl", "egl-quads" or "cpu".
 Backend parseBackend(std::string_view text);

@@ -120,13 +120,6 @@ std::vector<GivenIsovalue> parseIsovalues(const SurfaceArguments& arguments) {
   return given;
 }
 
-/// `of`: what has the colour, in the names of the options.
-glm::vec3 parseColour(const std::string& of, const std::string& text) {
-  if (text == "transparent")
-    throw UsageError("--{0}-colour transparent: give #rrggbb, and --{0}-opacity", of);
-  return glm::vec3(parseBackground(fmt::format("--{}-colour", of), text));
-}
-
 /// A colour for each isosurface, in their order; empty: all have the function's.
 std::vector<std::optional<glm::vec3>> parseIsoColours(const SurfaceArguments& arguments) {
   std::vector<std::optional<glm::vec3>> colours;
@@ -153,7 +146,7 @@ size_t isoVariable(const GivenIsovalue& given, const CacheReader& cache) {
   try {
     return cache.variableNamed(given.scalar);
   } catch (const UsageError& error) {
-    throw Error("--iso {}={:g}: {}", given.scalar, given.value, error.what());
+    throw UsageError("--iso {}={:g}: {}", given.scalar, given.value, error.what());
   }
 }
 
@@ -169,8 +162,8 @@ void addIsosurfaces(const SurfaceArguments& arguments, const CacheReader& cache,
     if (variable) {
       const VariableInfo& info = cache.manifest().variables[*variable];
       if (!(value >= info.min && value <= info.max))
-        throw Error("--iso {}: no isosurface: the values of {} go from {:.6g} to {:.6g}", value, info.name,
-                    info.min, info.max);
+        throw UsageError("--iso {}: no isosurface: the values of {} go from {:.6g} to {:.6g}", value,
+                         info.name, info.min, info.max);
     }
     std::vector<double>* values = &scene.isovalues;
     std::vector<std::optional<glm::vec3>>* of_values = &scene.iso_colours;
