@@ -75,6 +75,7 @@ void Hdf5Sets::with(const std::filesystem::path& path, const std::string& name,
     if (!file) throw Error("{}: {}: is not an HDF5 file, or is damaged", path.string(), name);
     Hdf5DataSet set(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT));
     if (!set) throw Error("{}: {}: has no such data set", path.string(), name);
+    watched_.try_emplace(path, std::vector<std::string>{path.string()});
     if (open_.size() == kMaxOpen) open_.pop_back();
     open_.push_front({path, name, std::move(file), std::move(set)});
   }
@@ -95,7 +96,6 @@ Hdf5Array::Hdf5Array(std::shared_ptr<Hdf5Sets> sets, std::filesystem::path path,
     for (const uint64_t n : dims_)
       size_ = n > 0 && size_ > kMaxArrayValues / n ? kMaxArrayValues + 1 : size_ * n;
     if (dims_.empty()) fail("has no dimensions; expected an array");
-    watched_ = WatchedFiles({path_.string()});
     if (size_ > kMaxArrayValues) fail("has impossible dimensions; the file is damaged");
     stored_bytes_ = isVirtual(set) ? std::numeric_limits<uint64_t>::max() : H5Dget_storage_size(set);
   });
@@ -160,8 +160,8 @@ void Hdf5Array::readParts(As as, const std::function<void(const ReadPart&)>& use
                           filter));
         fail("cannot be read (HDF5: " + reason + "); the file is damaged");
       }
-      watched_.requireWhole();
     });
+    sets_->requireWhole(path_);
   });
 }
 
