@@ -41,7 +41,6 @@ CURVISPLAT_LIBRARY_FUNCTION(cgio_release_id)
 
 namespace {
 
-constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 // Names and labels have at most 32 characters, but libcgns copies whatever length a damaged file has.
 constexpr size_t kTextBytes = 4096;
 // Elements that are read from an ADF file at a time; their types are converted here.
@@ -102,7 +101,7 @@ std::string beginOf(const InputFile& file) {
 }
 
 bool isHdf5(const InputFile& file) {
-  return beginOf(file).starts_with(kHdf5Mark);
+  return beginOf(file).starts_with(kHdf5Signature);
 }
 
 /// A number of digits in base 16; nullopt if it is none.

@@ -28,8 +28,7 @@ using Hdf5Object = Hdf5Handle<H5Oclose>;
 }  // namespace
 
 std::set<std::string> rootLinksOf(const InputFile& file, std::initializer_list<const char*> names) {
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  if (beginningOf(file, kSignature.size()) != kSignature) return {};
+  if (beginningOf(file, kHdf5Signature.size()) != kHdf5Signature) return {};
   requireWholeHdf5(file);
   tryHdf5(file.path());
   const QuietHdf5 quiet;

@@ -39,8 +39,7 @@ constexpr size_t kLooked = 64;
 
 /// nullopt if `begin` is not that of an HDF5 file, or of a version that is not known.
 std::optional<uint64_t> statedEnd(const std::array<uint8_t, kLooked>& begin) {
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  if (!std::equal(kSignature.begin(), kSignature.end(), begin.begin(),
+  if (!std::equal(kHdf5Signature.begin(), kHdf5Signature.end(), begin.begin(),
                   [](char a, uint8_t b) { return static_cast<uint8_t>(a) == b; }))
     return std::nullopt;
   const uint8_t version = begin[8];
