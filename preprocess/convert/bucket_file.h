@@ -1,6 +1,6 @@
 // The temporary data of conversion: one file, in which each bucket's records form four chains of chunks. A chunk
 // is what one bucket's buffer held when it was full, so writes are large whatever order the splats come in,
-// and the memory of a bucket is its buffer and four offsets. Chains are equally long, so that as many threads can read a bucket.
+// and the memory of a bucket is its buffer and four offsets. The chains are about equally long: four threads can read a bucket.
 //
 //    chunk:  checksum of what follows                           uint64
 //            offset of its chain's chunk before, or kNoChunk    uint64
@@ -8,7 +8,7 @@
 //            whole records
 //            zeros up to a multiple of kDirectAlignment
 //
-// It is written once and read once, and is larger than memory: it goes past the page cache. It is never
+// It is written once, read once and larger than memory, so that it bypasses the page cache. It is never
 // synced. The checksums are for an interrupted conversion that goes on with a file of which the disk may have
 // lost a part.
 #pragma once
@@ -54,7 +54,7 @@ class BucketFile {
   /// here or when reading if the file has changed.
   enum class Access { kRead, kAppend };
   BucketFile(const std::filesystem::path& path, BucketChains chains, Access access = Access::kRead);
-  /// Removes the file, unless it is to be left.
+  /// Removes the file, unless leave() was called.
   ~BucketFile();
   void leave();
 
@@ -72,14 +72,14 @@ class BucketFile {
   /// nothing can be appended. `sync`: another machine will read it.
   void close(bool sync = false);
 
-  /// Has the records of another rank's file, which has the same buckets, read as well. Call it after close().
+  /// Adds the records of another rank's file, which has the same buckets, to those that are read. Call it after close().
   /// That file stays. Throws as the second constructor does.
   void join(const std::filesystem::path& path, BucketChains chains);
 
   /// The chains of this rank's own file.
   BucketChains chains() const;
   uint64_t bytes(uint32_t bucket) const;
-  /// All records of a bucket; the order is not to be relied on. Overwrites `out` and keeps its capacity.
+  /// Reads all records of a bucket, in no particular order. Overwrites `out` and keeps its capacity.
   void read(uint32_t bucket, std::vector<std::byte>& out) const;
   /// The same, a chunk at a time, which is whole records.
   void forEachChunk(uint32_t bucket, const std::function<void(std::span<const std::byte>)>& use) const;

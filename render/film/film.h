@@ -36,7 +36,7 @@ class Film {
     bool any() const { return functions || clip_boxes || clip_planes || slices; }
   };
 
-  /// `looks`: of each key frame. All of them have functions, or none; planes and boxes that one lacks and another has are
+  /// `looks`: of each key frame. All of them have functions, or none has. A key frame without a box or planes, where another one has them, has
   /// none. `scalar`: that the functions are of; empty: not stated. `scale`: the data's scale (FrameOptions::scale) of the pictures
   /// that the cameras are for; none: of any. Throws Error that names the key frame.
   Film(CameraPath cameras, std::vector<KeyLook> looks, std::string scalar, const std::string& name,
