@@ -47,6 +47,12 @@ void add(FrameStatistics& statistics, const ProjectionCounts& counts) {
   statistics.splats_drawn += counts.drawn;
 }
 
+PagerOptions reading(const FrameBudget& budget) {
+  PagerOptions options;
+  options.buffer_bytes = budget.pager_bytes;
+  return options;
+}
+
 /// A number that no cache, step or variable had before.
 uint64_t nextContent() {
   static std::atomic<uint64_t> last = 0;
@@ -58,19 +64,17 @@ uint64_t nextContent() {
 /// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
   Pools(const CacheReader& cache, const BrickSource::Variables& variables_, const FrameBudget& budget_,
-        const PagerOptions& pager_, ComputePermits& permits)
+        ComputePermits& permits)
       : variables(variables_),
         budget(budget_),
-        pager(pager_),
         splats(std::make_unique_for_overwrite<ScreenSplat[]>(budget.ring_splats)),
         ring({splats.get(), budget.ring_splats}),
         sweep(budget.sweep_splats, budget.ring_splats / 2),
-        source(cache, variables, pager, budget.cache_bytes, budget.kept_bytes),
+        source(cache, variables, reading(budget), budget.cache_bytes, budget.kept_bytes),
         workers(source, sweep, ring, permits, budget.workers) {}
 
   const BrickSource::Variables variables;
   const FrameBudget budget;
-  const PagerOptions pager;
   const std::unique_ptr<ScreenSplat[]> splats;
   SegmentRing ring;
   SweepBuffer sweep;
@@ -119,15 +123,12 @@ void FramePipeline::makePools(const FrameOptions& options, const BrickSource::Va
   // Steps differ in this; the pools stay.
   least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variables));
   const FrameBudget budget = budgetOf(options, variables.second.has_value());
-  PagerOptions pager;
-  pager.buffer_bytes = budget.pager_bytes;
-  pager.way = options.read_by;
   if (pools_ && pools_->variables == variables && pools_->budget == budget &&
-      pools_->pager.way == pager.way && permits_->count() == threadsOf(options))
+      permits_->count() == threadsOf(options))
     return;
   dropPools();  // before the new ones take their memory
   permits_ = std::make_unique<ComputePermits>(threadsOf(options));
-  auto fresh = std::make_unique<Pools>(cache_, variables, budget, pager, *permits_);
+  auto fresh = std::make_unique<Pools>(cache_, variables, budget, *permits_);
   requireSpareMemory();
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
