@@ -26,14 +26,9 @@ std::vector<uint64_t> extentOf(const Hdf5Space& space) {
   return {extent.begin(), extent.begin() + rank};
 }
 
-bool isVirtual(hid_t set) {
-  const Hdf5Handle<H5Pclose> properties(H5Dget_create_plist(set));
-  return properties && H5Pget_layout(properties.id()) == H5D_VIRTUAL;
-}
-
 /// The first filter of a data set that HDF5 does not have on this machine; empty if it has all.
 std::string missingFilter(hid_t set) {
-  const Hdf5Handle<H5Pclose> properties(H5Dget_create_plist(set));
+  const Hdf5Properties properties(H5Dget_create_plist(set));
   const int count = properties ? H5Pget_nfilters(properties.id()) : 0;
   for (int n = 0; n < count; ++n) {
     std::array<char, 64> name{};
@@ -97,7 +92,8 @@ Hdf5Array::Hdf5Array(std::shared_ptr<Hdf5Sets> sets, std::filesystem::path path,
       size_ = n > 0 && size_ > kMaxArrayValues / n ? kMaxArrayValues + 1 : size_ * n;
     if (dims_.empty()) fail("has no dimensions; expected an array");
     if (size_ > kMaxArrayValues) fail("has impossible dimensions; the file is damaged");
-    stored_bytes_ = isVirtual(set) ? std::numeric_limits<uint64_t>::max() : H5Dget_storage_size(set);
+    stored_bytes_ = isVirtual(Hdf5Properties(H5Dget_create_plist(set))) ? std::numeric_limits<uint64_t>::max()
+                                                                        : H5Dget_storage_size(set);
   });
 }
 

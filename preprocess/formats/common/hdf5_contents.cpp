@@ -23,8 +23,6 @@ constexpr double kMaxCount = 1e14;
 // No filter packs numbers more tightly than this, but the emptiest of arrays.
 constexpr uint64_t kMaxPacking = 65536, kSmall = uint64_t{1} << 20;
 
-using Hdf5Object = Hdf5Handle<H5Oclose>;
-
 }  // namespace
 
 std::set<std::string> rootLinksOf(const InputFile& file, std::initializer_list<const char*> names) {
