@@ -68,8 +68,8 @@ struct FrameOptions {
   std::optional<uint64_t> card_memory_bytes;
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
-  /// The processes that draw the picture together, each some of its tiles; null: this process alone.
-  Ranks* ranks = nullptr;
+  /// The processes that draw the picture together, each some of its tiles. Never null.
+  Ranks* ranks = &oneRank();
   std::stop_token stop;  // ends the drawing with Interrupted
 };
 

@@ -102,7 +102,8 @@ FramePipeline::~FramePipeline() {
 }
 
 FrameBudget FramePipeline::budgetOf(const FrameOptions& options, bool two_scalars) const {
-  const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
+  const bool alone = options.ranks->alone();
+  const uint64_t exchange_bytes = alone ? 0 : 3 * exchangeBytes(options);
   const FrameBudget::Fixed fixed{
       planner_.bytes(options),
       least_pager_bytes_,
@@ -115,7 +116,7 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options, bool two_scalar
       options.size,
       cache_.series().steps.size() > 1,
       two_scalars,
-      options.ranks != nullptr};
+      !alone};
   return FrameBudget::of(options.memory_bytes, fixed, options.threads);
 }
 
@@ -277,11 +278,11 @@ bool FramePipeline::beginExchangedSlab(const FrameRegion* region) {
 /// The numbers in plan.shared of the plan's parts, which are some of those in the same order.
 void FramePipeline::beginExchange(const FramePlan& plan, const FrameOptions& options) {
   returnFreedMemory(kLargeBlock);
-  exchange_ = std::make_unique<SplatExchange>(*options.ranks, *plan.shared, exchangeBytes(options));
+  exchange_ = std::make_unique<SplatExchange>(*options.ranks, plan.shared, exchangeBytes(options));
   shared_numbers_.clear();
   uint32_t number = 0;
   for (const SweptPart& part : plan.parts) {
-    while (plan.shared->parts[number].part.brick != part.part.brick) ++number;
+    while (plan.shared.parts[number].part.brick != part.part.brick) ++number;
     shared_numbers_.push_back(number++);
   }
 }
@@ -358,7 +359,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
   std::optional<TraceScope> starting(std::in_place, "start frame");
   makePools(options, variables());
   exchange_.reset();
-  if (plan.shared) beginExchange(plan, options);
+  if (!options.ranks->alone()) beginExchange(plan, options);
   fillStore(plan, options, on_card != nullptr, statistics);
   const FrameWork work{cache_,  plan.parts, plan.settings,      planner_.table(), plan.keys,
                        hidden_, is_stored_, options.keep_going, exchange_.get()};
@@ -424,7 +425,6 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
 /// Whether the painters of all ranks have completed the picture; false if more splats waited in one than it had memory for.
 /// Throws what this rank's painter threw, or OtherPainterFailure if another rank's did.
 bool FramePipeline::isOfAll(const FrameOptions& options) const {
-  if (!options.ranks) return !overfull_;
   std::array<uint64_t, 2> numbers{overfull_ ? 1u : 0u, failure_ ? 1u : 0u};
   options.ranks->sum(numbers);
   if (failure_) std::rethrow_exception(failure_);
@@ -441,7 +441,7 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
   const size_t waiting = painting_ == backend_.get() ? pools_->budget.waiting_splats : aside_waiting_splats_;
   failure_ = nullptr;
   painting_->run([&](Painter& own) {
-    Painter& painter = options.ranks ? enduring_.emplace(own) : own;
+    Painter& painter = options.ranks->alone() ? own : enduring_.emplace(own);
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
                   {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers,
                    planner_.colourClasses(), static_cast<float>(plan.settings.view.low_pass_px2)},
@@ -469,7 +469,7 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     if (on_card) *on_card = painter.endOnCard();
     if (!on_card || !*on_card) image = painter.end();
     overfull_ = painter.isOverfull();
-    if (options.ranks) failure_ = enduring_->failure();
+    if (!options.ranks->alone()) failure_ = enduring_->failure();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
     statistics.draw_s = painter.drawSeconds();
