@@ -1,4 +1,4 @@
-#include "render/frame/frame_pipeline.h"
+#include "render/frame/layer_drawer.h"
 
 #include <fmt/format.h>
 
