@@ -232,28 +232,17 @@ float FileDialog::heightBelow() const {
 void FileDialog::drawHelp(bool saves) const {
   ImGui::BeginChild("entries", {0, -heightBelow()}, true);
   nameArea("dialog keys", 0, 0, 1, 1);
-  if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_RowBg)) {
-    const auto row = [](const char* key, const char* what) {
-      ImGui::TableNextRow();
-      ImGui::TableNextColumn();
-      ImGui::TextUnformatted(key);
-      ImGui::TableNextColumn();
-      ImGui::TextUnformatted(what);
-    };
-    ImGui::TableSetupColumn("key or mouse");
-    ImGui::TableSetupColumn("what it does");
-    ImGui::TableHeadersRow();
-    row("Return", saves ? "saves under the name" : "opens what is named or chosen; enters a folder");
-    row("Esc", "shows the files again; there, closes the dialog");
-    row("click", "chooses a file");
-    row("double click", saves ? "saves under its name; enters a folder" : "opens a file; enters a folder");
-    if (*purpose_ == Purpose::kOpenData) {
-      row("Ctrl + click", "chooses several: a grid and its solutions");
-      row("Shift + click", "chooses all from the chosen one to this one");
-    }
-    row("F1", "shows the files again");
-    ImGui::EndTable();
+  std::vector<KeyRow> rows{
+      {"Return", saves ? "saves under the name" : "opens what is named or chosen; enters a folder"},
+      {"Esc", "shows the files again; there, closes the dialog"},
+      {"click", "chooses a file"},
+      {"double click", saves ? "saves under its name; enters a folder" : "opens a file; enters a folder"}};
+  if (*purpose_ == Purpose::kOpenData) {
+    rows.push_back({"Ctrl + click", "chooses several: a grid and its solutions"});
+    rows.push_back({"Shift + click", "chooses all from the chosen one to this one"});
   }
+  rows.push_back({"F1", "shows the files again"});
+  drawKeyTable(rows);
   ImGui::EndChild();
 }
 
