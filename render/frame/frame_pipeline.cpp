@@ -36,17 +36,6 @@ unsigned threadsOf(const FrameOptions& options) {
   return threadsOrCores(options.threads);
 }
 
-/// Adds the splats of a BrickStore to those that the workers counted.
-void add(FrameStatistics& statistics, const ProjectionCounts& counts) {
-  statistics.card_splats = counts.read;
-  statistics.splats_read += counts.read;
-  statistics.splats_clipped += counts.clipped;
-  statistics.splats_behind += counts.hidden;
-  statistics.splats_off_screen += counts.off_screen;
-  statistics.splats_transparent += counts.transparent;
-  statistics.splats_drawn += counts.drawn;
-}
-
 PagerOptions reading(const FrameBudget& budget) {
   PagerOptions options;
   options.buffer_bytes = budget.pager_bytes;
@@ -486,7 +475,11 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.card_read_bytes = card.read_bytes;
     statistics.card_pixels_listed = card.pixels_listed;
     statistics.card_pixels_blended = card.pixels_blended;
-    if (!stored_.empty()) add(statistics, painter.store()->counts());
+    if (!stored_.empty()) {
+      const ProjectionCounts counts = painter.store()->counts();
+      statistics.card_splats = counts.read;
+      add(statistics, counts);
+    }
   });
   if (const ShadowGrid* const shadows = plan.settings.shadows.get()) {
     PrepareStatistics unreadable;

@@ -8,6 +8,15 @@
 
 namespace curvisplat {
 
+void add(PrepareStatistics& statistics, const ProjectionCounts& counts) {
+  statistics.splats_read += counts.read;
+  statistics.splats_clipped += counts.clipped;
+  statistics.splats_behind += counts.hidden;
+  statistics.splats_off_screen += counts.off_screen;
+  statistics.splats_transparent += counts.transparent;
+  statistics.splats_drawn += counts.drawn;
+}
+
 /// The buffers that a worker keeps from brick to brick, so that preparing a brick allocates nothing.
 struct FrameWorkers::Worker {
   BrickSource::Scratch scratch;
@@ -314,13 +323,7 @@ void FrameWorkers::count(Worker& worker, bool again) {
     ++statistics.bricks_again;
     return;
   }
-  const ProjectionCounts& counts = worker.projector.counts();
-  statistics.splats_read += counts.read;
-  statistics.splats_clipped += counts.clipped;
-  statistics.splats_behind += counts.hidden;
-  statistics.splats_off_screen += counts.off_screen;
-  statistics.splats_transparent += counts.transparent;
-  statistics.splats_drawn += counts.drawn;
+  add(statistics, worker.projector.counts());
 }
 
 /// Ends the turn of a part that is hidden or lies behind the slab.

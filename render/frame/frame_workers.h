@@ -52,6 +52,9 @@ struct SamplingWork {
   std::optional<BrickSource::Variables> variables = std::nullopt;  // none: the picture's
 };
 
+/// Adds the counts of splats that were projected.
+void add(PrepareStatistics& statistics, const ProjectionCounts& counts);
+
 class FrameWorkers {
  public:
   /// Starts `count` threads, named "prepare", which hold a permit while they compute. The other arguments must outlive them.
