@@ -273,10 +273,7 @@ class Addition {
 
 }  // namespace
 
-AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& given_options,
-                           Progress& progress) {
-  AddScalarOptions options = given_options;
-  if (!options.ranks) options.ranks = &oneRank();
+AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& options, Progress& progress) {
   const WatchedFiles files(source.description().files);
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (const auto* const grid = dynamic_cast<const GridSource*>(&source))

@@ -27,8 +27,8 @@ struct AddScalarOptions {
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
 
   /// Processes that add together: each has the same source and options, and calls addScalars(). Rank 0 alone changes the
-  /// cache, and its report counts. Null: this process alone.
-  Ranks* ranks = nullptr;
+  /// cache, and its report counts.
+  Ranks* ranks = &oneRank();
 
   TestLimits limits;
 };

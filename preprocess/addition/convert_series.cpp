@@ -30,7 +30,7 @@ class SeriesConversion {
         options_(options),
         progress_(progress),
         report_event_(report),
-        ranks_(options.convert.ranks ? *options.convert.ranks : oneRank()) {
+        ranks_(*options.convert.ranks) {
     const std::filesystem::path& output = options.convert.output;
     const bool is_cache = std::filesystem::exists(output / "manifest.json") && !hasUnfinished(output);
     if (options.add || (options.convert.resume && is_cache)) openCache();

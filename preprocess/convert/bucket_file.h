@@ -55,7 +55,7 @@ class BucketFile {
   /// here or when reading if the file has changed.
   enum class Access { kRead, kAppend };
   BucketFile(const std::filesystem::path& path, BucketChains chains, Access access = Access::kRead);
-  /// Removes the file, unless it is to be left.
+  /// Removes the file, unless leave() was called.
   ~BucketFile();
   void leave();
 

@@ -181,9 +181,7 @@ uint64_t nodesOf(const GridDescription& description) {
 
 }  // namespace
 
-ConvertReport convert(const DataSource& source, const ConvertOptions& given_options, Progress& progress) {
-  ConvertOptions options = given_options;
-  if (!options.ranks) options.ranks = &oneRank();
+ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress) {
   const WatchedFiles files(source.description().files);
   ConvertReport report = convertSets(
       source, options,
@@ -222,7 +220,7 @@ ConvertOptions optionsOfSample(const ConvertOptions& options, const std::filesys
   of_sample.overwrite = of_sample.resume = false;
   of_sample.differing = DifferingScalars::kBlankAll;
   of_sample.planes.clear();  // the sample may not have them
-  of_sample.ranks = nullptr;
+  of_sample.ranks = &oneRank();
   return of_sample;
 }
 

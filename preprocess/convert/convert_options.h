@@ -52,9 +52,8 @@ struct ConvertOptions {
   bool blank_faces = false;                          // store the faces of blanked cells, with `surfaces`
   Overlap overlap = Overlap::kOwner;                 // what is drawn where blocks overlap
 
-  /// The processes that convert together. Each calls convert() with the same source and options. Borrowed;
-  /// null: this process converts alone.
-  Ranks* ranks = nullptr;
+  /// The processes that convert together. Each calls convert() with the same source and options. Borrowed, never null.
+  Ranks* ranks = &oneRank();
 
   TestLimits limits;  // for tests
 };

@@ -157,9 +157,13 @@ uint64_t MeshOrigin::finish(const SinkOfThread&, Progress&) {
 
 namespace {
 
-template <typename T>
-void addBytes(Checksum& checksum, const std::vector<T>& values) {
-  checksum.add(std::as_bytes(std::span(values)));
+/// The checksum of arrays of a range, and of the range's number.
+template <typename... T>
+uint64_t checksumOfRange(uint64_t number, const std::vector<T>&... arrays) {
+  Checksum checksum;
+  (checksum.add(std::as_bytes(std::span(arrays))), ...);
+  checksum.add(std::as_bytes(std::span(&number, 1)));
+  return checksum.value();
 }
 
 void widen(ScalarRange& range, float value) {
@@ -210,12 +214,7 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
         widen(grid.ranges[scalar], cells.scalars[scalar][n]);
     }
     if (cell_data) grid.blanked += loaded.blanked;
-    Checksum checksum;
-    addBytes(checksum, cells.shapes);
-    addBytes(checksum, cells.corners);
-    addBytes(checksum, cells.faces);
-    checksum.add(std::as_bytes(std::span(&loaded.range.number, 1)));
-    grid.grid_checksum += checksum.value();
+    grid.grid_checksum += checksumOfRange(loaded.range.number, cells.shapes, cells.corners, cells.faces);
     progress.advance(cell_data ? loaded.range.count : 0);
   });
 
@@ -234,12 +233,7 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
         widen(grid.ranges[scalar], points.scalars[scalar][n]);
     }
     if (!cell_data) grid.blanked += loaded.blanked;
-    Checksum checksum;
-    addBytes(checksum, points.x);
-    addBytes(checksum, points.y);
-    addBytes(checksum, points.z);
-    checksum.add(std::as_bytes(std::span(&loaded.range.number, 1)));
-    grid.grid_checksum += checksum.value();
+    grid.grid_checksum += checksumOfRange(loaded.range.number, points.x, points.y, points.z);
     progress.advance(cell_data ? 0 : loaded.range.count);
   });
   // Nothing is drawn where there is no cell, or where every point of them is blanked.

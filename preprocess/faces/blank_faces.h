@@ -5,7 +5,7 @@
 //
 // Where blocks meet, a drawn cell of one may have a blanked cell of another beside it: the ends of all cells are matched, and
 // those of the drawn ones alone. A quad that abuts on another, but not on a drawn cell's, is such a face.
-// Strips, since such a face lies in many planes, with few quads in each. There are no levels of detail: where a floor
+// They are strips, since such a face lies in many planes, with few quads in each. There are no levels of detail: where a floor
 // slopes, a plane has a narrow strip of it, which a coarser lattice would lose.
 // Memory: `sort_bytes`, a patch, and two bits for each face at the end of a block. The bytes depend neither on memory nor on threads.
 #pragma once

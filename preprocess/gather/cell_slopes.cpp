@@ -231,8 +231,8 @@ void CellSlopes::addBodies(const GatheredCells& cells) {
 void CellSlopes::addFaces(const GatheredCells& cells) {
   const auto cellOf = [&](size_t face) { return size_t{list_.places[face].cell}; };
   const auto tellOf = [&](uint64_t cell, size_t neighbour) {
-    tell(cell, cells.numbers[neighbour], of_cells_[neighbour].centre,
-         std::as_bytes(valuesOf(cells, neighbour)));
+    addNeighbour(cell, cells.numbers[neighbour], of_cells_[neighbour].centre,
+                 std::as_bytes(valuesOf(cells, neighbour)));
   };
   faces_->add(
       list_.corners,
@@ -254,7 +254,7 @@ void CellSlopes::addFaces(const GatheredCells& cells) {
          const uint64_t cell = cells.numbers[cellOf(second)];
          if (joinInRange(earlier.cell, cell)) return;
          tellOf(earlier.cell, cellOf(second));
-         tell(cell, earlier.cell, earlier.centre_of_cell, first.subspan(sizeof(FaceRecord)));
+         addNeighbour(cell, earlier.cell, earlier.centre_of_cell, first.subspan(sizeof(FaceRecord)));
        }});
 }
 
@@ -270,8 +270,8 @@ bool CellSlopes::joinInRange(uint64_t a, uint64_t b) {
   return true;
 }
 
-void CellSlopes::tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre,
-                      std::span<const std::byte> values) {
+void CellSlopes::addNeighbour(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre,
+                              std::span<const std::byte> values) {
   const NeighbourRecord record{cell, neighbour, centre};
   std::memcpy(neighbour_.data(), &record, sizeof record);
   std::memcpy(neighbour_.data() + sizeof record, values.data(), values.size());
@@ -332,8 +332,8 @@ PointSums::Counts CellSlopes::finish(const TakeSplat& take, SlabCells slabs, con
   const auto join = [&](std::span<const std::byte> first, std::span<const std::byte> second) {
     const FaceRecord a = recordIn<FaceRecord>(first), b = recordIn<FaceRecord>(second);
     if (a.cell == b.cell || joinInRange(a.cell, b.cell)) return;
-    tell(a.cell, b.cell, b.centre_of_cell, second.subspan(sizeof(FaceRecord)));
-    tell(b.cell, a.cell, a.centre_of_cell, first.subspan(sizeof(FaceRecord)));
+    addNeighbour(a.cell, b.cell, b.centre_of_cell, second.subspan(sizeof(FaceRecord)));
+    addNeighbour(b.cell, a.cell, a.centre_of_cell, first.subspan(sizeof(FaceRecord)));
   };
   faces_->finish(
       join,

@@ -53,7 +53,8 @@ class CellSlopes {
   void addFaces(const GatheredCells& cells);
   /// Whether both cells are of one range, and know one another now.
   bool joinInRange(uint64_t a, uint64_t b);
-  void tell(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre, std::span<const std::byte> values);
+  void addNeighbour(uint64_t cell, uint64_t neighbour, const glm::dvec3& centre,
+                    std::span<const std::byte> values);
   void makeSplats(size_t range, const TakeSplat& take, SlabCells slabs, PointSums::Counts& counts);
 
   const uint64_t cells_;

@@ -100,7 +100,7 @@ struct GridDescription {
   std::string blanking;               // the files' rule for blanking in words; empty: iblank or the like
   std::string undefined;              // fill values, which are read as NaN: "T = -999"; may be empty
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
-  std::vector<std::string> notes;     // what the files say besides: "boundaries BCWall 3, BCInflow 1"
+  std::vector<std::string> notes;     // further contents: "boundaries BCWall 3, BCInflow 1"
 };
 
 /// The nodes of a NodeBox, i fastest, then j, then k. The source resizes the arrays, which keep their

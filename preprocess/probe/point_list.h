@@ -1,4 +1,4 @@
-// Points of a text, to probe a grid at.
+// Parses points at which a grid is to be probed.
 //
 //    x,y,z                heading, optional
 //    0.5,0.25,1e-3        x, y and z, between commas, semicolons, tabs or spaces; the rest of the line is ignored

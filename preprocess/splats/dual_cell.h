@@ -1,5 +1,5 @@
-// The piece of the grid around a node, by which its splat weighs: its dual cell, the octants next to the node of the
-// trilinear cells around it that are there. Dual cells tile the grid, also at its ends and beside what is blanked:
+// The piece of the grid around a node, whose volume is the weight of its splat: the dual cell. Each trilinear cell around the
+// node that is there gives it the octant next to the node. Dual cells tile the grid, also at its ends and beside blanked nodes:
 //
 //     o-----------o-----------o     o   node
 //     |     +-----|-----+     |     +   middle of a cell; the sides of the piece go through the middles of edges
@@ -14,11 +14,11 @@
 //     |x_i x_j x_k|  +  1/8 sum over p of |(x_pqq + x_prr) x_q x_r|                          p, q, r: i, j, k in turn
 //                    +  1/8 sum over p of |x_p (x_qr  x_rr + x_qq  x_qr + 1/2 x_qp  x_rp)|   products in the brackets: crossed
 //
-// and terms of higher order, which are the square of these corrections, about. Without twists the first term is exact.
-// Where the corrections are above kMaxCorrection the octants are measured one by one: so volumes are exact to 1e-4.
+// and terms of higher order, about the square of these corrections. Without twists the first term is exact. Where the
+// corrections are above kMaxCorrection, the octants are measured one by one; volumes are exact to 1e-4 then.
 //
 // Rejected: the hexahedron of the middles of the eight cells around the node, which tiles space as well and is as quick.
-// Its sides are straight, and at a border all of the sagitta by which the grid bends is taken from the one piece there.
+// Its sides are straight, so that at a curved border one piece loses the whole sagitta.
 // Pure: any thread.
 #pragma once
 
@@ -56,7 +56,7 @@ struct DualPiece {
 DualPiece dualPiece(const NodeLattice& nodes, ptrdiff_t at, const std::array<ptrdiff_t, 3>& strides,
                     uint32_t there, bool moments);
 
-/// The volume of the same, without a sign.
+/// The absolute volume of dualPiece().
 double dualVolume(const NodeLattice& nodes, ptrdiff_t at, const std::array<ptrdiff_t, 3>& strides,
                   uint32_t there);
 
@@ -66,7 +66,7 @@ double dualVolume(const NodeLattice& nodes, ptrdiff_t at, const std::array<ptrdi
 /// Around a wall from which cells grow by 1.35, a uniform medium is 1.7 % too dense otherwise, and 5 % too thin at its end.
 std::array<double, 3> widthGrowth(const NodeLattice& nodes, ptrdiff_t at, const Neighbours& neighbours);
 
-/// Nodes at this distance, of the longest to others, are one: those of a pole, which rounding alone sets apart.
+/// Nodes closer than this fraction of the longest distance between neighbours are one: rounding alone sets those of a pole apart.
 inline constexpr double kCollapsed = 1e-9;
 
 /// A node whose cell has collapsed, at a pole or on a singular line.

@@ -289,6 +289,12 @@ HWY_INLINE bool paintBlock(float* HWY_RESTRICT block, const Blend& blend) {
 struct Scalar {
   float mean, reach, tp, tq, half_width;
   float nearer = 0, seen_half_width = 0;
+
+  HWY_INLINE V meanAt(const Pixels& pixels) const {
+    const Floats d;
+    const V t = hn::MulAdd(hn::Set(d, tp), pixels.p, hn::Mul(hn::Set(d, tq), pixels.q));
+    return hn::MulAdd(hn::Set(d, reach), t, hn::Set(d, mean));
+  }
 };
 
 /// A block of which every pixel that the splat touches is looked up: one whose bit is set. The others have no depth, so that
@@ -341,9 +347,8 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Tables
     const uint32_t touched = bitsOf(pixels.inFootprint());
     if (touched == 0) continue;
     out.touched |= touched << lane;
-    const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
     hn::Store(depthAt(e, footprint, pixels), d, out.depth.at + lane);
-    const V mean = hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean));
+    const V mean = scalar.meanAt(pixels);
     locate(tables.shading, mean, hn::Set(d, scalar.half_width), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
     if (hides)

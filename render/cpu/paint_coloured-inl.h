@@ -134,25 +134,15 @@ HWY_INLINE Channel channelOf(const ShadingTable& table, const Fits& fits, size_t
   return channel;
 }
 
-/// The rest of some pixels along the ray: moments as those of an Interval.
-struct Remaining {
-  V share, mean, lost_variance;
-};
-
 HWY_INLINE void evaluate(Channel& channel, const Pixels& pixels, const Remaining& left, size_t lane,
                          Intervals& intervals) {
   const Floats d;
   if (channel.looked_up) {
-    const Scalar& scalar = channel.scalar;
-    const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
-    V mean = hn::MulAdd(hn::Set(d, channel.mean_per_deviation * ScreenCut::kReach), left.mean,
-                        hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)));
-    const float lost = 3 * channel.mean_per_deviation * channel.mean_per_deviation;
-    V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lost_variance,
-                             hn::Set(d, scalar.half_width * scalar.half_width));
+    V mean = channel.scalar.meanAt(pixels);
+    V width2 = narrow(channel.scalar, channel.mean_per_deviation, left, mean);
     if (channel.hiding.along != 0) {
       V nearer, narrower;
-      channel.hiding.of(left.share, left.lost_variance, nearer, narrower);
+      channel.hiding.of(left, nearer, narrower);
       mean = hn::Sub(mean, nearer);
       width2 = hn::Sub(width2, narrower);
     }
@@ -202,9 +192,7 @@ HWY_NOINLINE bool paintBlock(Coloured& splat, const DepthWindow& window, const f
       const Interval interval = intervalAt(cuts, pixels, lane);
       const V share = interval.share();
       depth = hn::Mul(depth, share);
-      left.share = share;
-      left.mean = interval.mean(share);
-      left.lost_variance = interval.lostVariance(share, left.mean);
+      left = interval.remaining(share);
     }
     deepest = hn::Max(deepest, depth);
     hn::Store(depth, d, depths.at + lane);

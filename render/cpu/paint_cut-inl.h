@@ -70,6 +70,11 @@ HWY_INLINE V secondTo(V x, V x2) {
   return hn::Mul(hn::Mul(x, x2), series);
 }
 
+/// The rest of some pixels along the ray: moments as those of an Interval.
+struct Remaining {
+  V share, mean, lost_variance;
+};
+
 /// The part of the pixels' depths that the faces leave: an interval of depths, over kReach deviations; so are
 /// its moments.
 struct Interval {
@@ -95,7 +100,21 @@ struct Interval {
     const V one = hn::Set(d, 1.0f);
     return hn::Sub(one, hn::Clamp(hn::Mul(hn::Set(d, 7.0f), variance), hn::Zero(d), one));
   }
+  HWY_INLINE Remaining remaining(V share) const {
+    const V middle = mean(share);
+    return {share, middle, lostVariance(share, middle)};
+  }
 };
+
+/// Moves the mean of a scalar at some pixels to that of what is left of the splat there. Returns the square of its half width.
+/// `mean_per_deviation`: as that of Faces.
+HWY_INLINE V narrow(const Scalar& scalar, float mean_per_deviation, const Remaining& left, V& mean) {
+  const Floats d;
+  mean = hn::MulAdd(hn::Set(d, mean_per_deviation * ScreenCut::kReach), left.mean, mean);
+  const float lost = 3 * mean_per_deviation * mean_per_deviation;
+  return hn::NegMulAdd(hn::Set(d, lost), left.lost_variance,
+                       hn::Set(d, scalar.half_width * scalar.half_width));
+}
 
 /// A splat's ScreenDepth, as Faces are.
 struct DepthLine {
@@ -114,10 +133,10 @@ struct Hiding {
   float along = 0, tau = 0;
 
   /// How much nearer the scalar is seen, and by how much less the square of its half width is.
-  HWY_INLINE void of(V share, V lost_variance, V& nearer, V& lost) const {
+  HWY_INLINE void of(const Remaining& rest, V& nearer, V& lost) const {
     const Floats d;
-    const V left = hn::Mul(share, hn::Set(d, tau)), side = nearSide(left);
-    const V kept = hn::Sub(hn::Set(d, 1.0f), lost_variance);
+    const V left = hn::Mul(rest.share, hn::Set(d, tau)), side = nearSide(left);
+    const V kept = hn::Sub(hn::Set(d, 1.0f), rest.lost_variance);
     nearer = hn::Mul(hn::Mul(hn::Set(d, kSqrt3 * along), hn::Sqrt(kept)), side);
     lost = hn::Mul(hn::Mul(hn::Set(d, 3 * along * along), kept), lostByHiding(left, side));
   }
@@ -238,19 +257,15 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
     const uint32_t touched = bitsOf(hn::Gt(depth, hn::Zero(d)));
     if (touched == 0) continue;
     out.touched |= touched << lane;
-    const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
     hn::Store(depth, d, out.depth.at + lane);
-    V mean = hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean));
+    V mean = scalar.meanAt(pixels);
     V half_width = hn::Set(d, scalar.half_width), seen_half_width = hn::Set(d, scalar.seen_half_width);
     V by = hn::Set(d, scalar.nearer);
     if (faces.mean_per_deviation != 0 || by_window) {
-      const V moved = left.mean(share), lost_variance = left.lostVariance(share, moved);
-      mean = hn::MulAdd(hn::Set(d, faces.mean_per_deviation * ScreenCut::kReach), moved, mean);
-      const float lost = 3 * faces.mean_per_deviation * faces.mean_per_deviation;
-      const V width2 =
-          hn::NegMulAdd(hn::Set(d, lost), lost_variance, hn::Set(d, scalar.half_width * scalar.half_width));
+      const Remaining rest = left.remaining(share);
+      const V width2 = narrow(scalar, faces.mean_per_deviation, rest, mean);
       V narrower = hn::Set(d, hidden2);
-      if (by_window) cuts.hiding.of(share, lost_variance, by, narrower);
+      if (by_window) cuts.hiding.of(rest, by, narrower);
       half_width = hn::Sqrt(hn::Max(width2, hn::Zero(d)));
       seen_half_width = hn::Sqrt(hn::Max(hn::Sub(width2, narrower), hn::Zero(d)));
     }

@@ -61,10 +61,10 @@ struct FrameRenderer::State {
     pipeline.setAside(0, 0, options);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options); });
-    if (options.ranks) planner.share(plan, options);
+    planner.share(plan, options);
     pipeline.drawLayers(plan, options, statistics, progress);
     Image image = pipeline.draw(plan, options, statistics, progress);
-    if (options.ranks) joinTiles(image, plan.shared->owners, *options.ranks);
+    joinTiles(image, plan.shared.owners, *options.ranks);
     return image;
   }
 
@@ -81,17 +81,14 @@ struct FrameRenderer::State {
                           waiting, clear);
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan = timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear); });
-    if (options.ranks) planner.share(plan, clear);
+    planner.share(plan, clear);
     pipeline.drawLayers(plan, clear, statistics, progress);
     Image image = pipeline.draw(plan, clear, statistics, progress);
     if (!beside) pipeline.release();
     Image painted = paintValues(camera, clear, {plan, image, beside}, progress);
-    if (options.ranks) {
-      joinTiles(image, plan.shared->owners, *options.ranks);
-      joinTiles(painted, plan.shared->owners, *options.ranks);
-    }
-    if (!options.ranks || options.ranks->isFirst())
-      values = pixelValuesOf(painted, plan.settings.view, depthOrigin(plan));
+    joinTiles(image, plan.shared.owners, *options.ranks);
+    joinTiles(painted, plan.shared.owners, *options.ranks);
+    if (options.ranks->isFirst()) values = pixelValuesOf(painted, plan.settings.view, depthOrigin(plan));
     for (size_t n = 0; n < image.rgba.size(); n += 4) {
       const float through = 1 - image.rgba[n + 3];
       for (size_t c = 0; c < 4; ++c) image.rgba[n + c] += through * options.background[static_cast<int>(c)];
@@ -116,7 +113,7 @@ struct FrameRenderer::State {
   Image paintValues(const Camera& camera, const FrameOptions& options, const Drawn& drawn,
                     Progress* progress) {
     FramePlan plan = planner.plan(camera, options);
-    if (options.ranks) planner.share(plan, options);
+    planner.share(plan, options);
     if (drawn.plan.layers) planner.addLayers(plan, drawn.plan.layers, options);
     const PixelLayers all = everywhere(drawn.picture.size, depthOrigin(drawn.plan));
     plan.settings.layers = &all;
@@ -134,7 +131,7 @@ struct FrameRenderer::State {
   };
   Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
                       FrameStatistics& statistics, bool& is_final, const QuickFor& whom) {
-    CURVISPLAT_CHECK(!options.ranks && "one process draws a quick picture");
+    CURVISPLAT_CHECK(options.ranks->alone() && "one process draws a quick picture");
     statistics = {};
     const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     QuickPlan quick =

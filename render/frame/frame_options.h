@@ -22,7 +22,6 @@
 #include "render/project/screen_view.h"
 #include "render/surface/surface_scene.h"
 #include "stream/base/ranks.h"
-#include "stream/paging/pager.h"
 
 namespace curvisplat {
 
@@ -69,9 +68,8 @@ struct FrameOptions {
   std::optional<uint64_t> card_memory_bytes;
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
-  PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;  // of bricks from the disk
-  /// The processes that draw the picture together, each some of its tiles; null: this process alone.
-  Ranks* ranks = nullptr;
+  /// The processes that draw the picture together, each some of its tiles. Never null.
+  Ranks* ranks = &oneRank();
   std::stop_token stop;  // ends the drawing with Interrupted
 };
 

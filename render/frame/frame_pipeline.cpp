@@ -36,15 +36,10 @@ unsigned threadsOf(const FrameOptions& options) {
   return threadsOrCores(options.threads);
 }
 
-/// Adds the splats of a BrickStore to those that the workers counted.
-void add(FrameStatistics& statistics, const ProjectionCounts& counts) {
-  statistics.card_splats = counts.read;
-  statistics.splats_read += counts.read;
-  statistics.splats_clipped += counts.clipped;
-  statistics.splats_behind += counts.hidden;
-  statistics.splats_off_screen += counts.off_screen;
-  statistics.splats_transparent += counts.transparent;
-  statistics.splats_drawn += counts.drawn;
+PagerOptions reading(const FrameBudget& budget) {
+  PagerOptions options;
+  options.buffer_bytes = budget.pager_bytes;
+  return options;
 }
 
 /// A number that no cache, step or variable had before.
@@ -58,19 +53,17 @@ uint64_t nextContent() {
 /// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
   Pools(const CacheReader& cache, const BrickSource::Variables& variables_, const FrameBudget& budget_,
-        const PagerOptions& pager_, ComputePermits& permits)
+        ComputePermits& permits)
       : variables(variables_),
         budget(budget_),
-        pager(pager_),
         splats(std::make_unique_for_overwrite<ScreenSplat[]>(budget.ring_splats)),
         ring({splats.get(), budget.ring_splats}),
         sweep(budget.sweep_splats, budget.ring_splats / 2),
-        source(cache, variables, pager, budget.cache_bytes, budget.kept_bytes),
+        source(cache, variables, reading(budget), budget.cache_bytes, budget.kept_bytes),
         workers(source, sweep, ring, permits, budget.workers) {}
 
   const BrickSource::Variables variables;
   const FrameBudget budget;
-  const PagerOptions pager;
   const std::unique_ptr<ScreenSplat[]> splats;
   SegmentRing ring;
   SweepBuffer sweep;
@@ -98,7 +91,8 @@ FramePipeline::~FramePipeline() {
 }
 
 FrameBudget FramePipeline::budgetOf(const FrameOptions& options, bool two_scalars) const {
-  const uint64_t exchange_bytes = options.ranks ? 3 * exchangeBytes(options) : 0;
+  const bool alone = options.ranks->alone();
+  const uint64_t exchange_bytes = alone ? 0 : 3 * exchangeBytes(options);
   const FrameBudget::Fixed fixed{
       planner_.bytes(options),
       least_pager_bytes_,
@@ -111,7 +105,7 @@ FrameBudget FramePipeline::budgetOf(const FrameOptions& options, bool two_scalar
       options.size,
       cache_.series().steps.size() > 1,
       two_scalars,
-      options.ranks != nullptr};
+      !alone};
   return FrameBudget::of(options.memory_bytes, fixed, options.threads);
 }
 
@@ -119,15 +113,12 @@ void FramePipeline::makePools(const FrameOptions& options, const BrickSource::Va
   // Steps differ in this; the pools stay.
   least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variables));
   const FrameBudget budget = budgetOf(options, variables.second.has_value());
-  PagerOptions pager;
-  pager.buffer_bytes = budget.pager_bytes;
-  pager.way = options.read_by;
   if (pools_ && pools_->variables == variables && pools_->budget == budget &&
-      pools_->pager.way == pager.way && permits_->count() == threadsOf(options))
+      permits_->count() == threadsOf(options))
     return;
   dropPools();  // before the new ones take their memory
   permits_ = std::make_unique<ComputePermits>(threadsOf(options));
-  auto fresh = std::make_unique<Pools>(cache_, variables, budget, pager, *permits_);
+  auto fresh = std::make_unique<Pools>(cache_, variables, budget, *permits_);
   requireSpareMemory();
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
@@ -276,11 +267,11 @@ bool FramePipeline::beginExchangedSlab(const FrameRegion* region) {
 /// The numbers in plan.shared of the plan's parts, which are some of those in the same order.
 void FramePipeline::beginExchange(const FramePlan& plan, const FrameOptions& options) {
   returnFreedMemory(kLargeBlock);
-  exchange_ = std::make_unique<SplatExchange>(*options.ranks, *plan.shared, exchangeBytes(options));
+  exchange_ = std::make_unique<SplatExchange>(*options.ranks, plan.shared, exchangeBytes(options));
   shared_numbers_.clear();
   uint32_t number = 0;
   for (const SweptPart& part : plan.parts) {
-    while (plan.shared->parts[number].part.brick != part.part.brick) ++number;
+    while (plan.shared.parts[number].part.brick != part.part.brick) ++number;
     shared_numbers_.push_back(number++);
   }
 }
@@ -357,7 +348,7 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
   std::optional<TraceScope> starting(std::in_place, "start frame");
   makePools(options, variables());
   exchange_.reset();
-  if (plan.shared) beginExchange(plan, options);
+  if (!options.ranks->alone()) beginExchange(plan, options);
   fillStore(plan, options, on_card != nullptr, statistics);
   const FrameWork work{cache_,  plan.parts, plan.settings,      planner_.table(), plan.keys,
                        hidden_, is_stored_, options.keep_going, exchange_.get()};
@@ -423,7 +414,6 @@ std::optional<Image> FramePipeline::drawInRegions(uint32_t least, const FramePla
 /// Whether the painters of all ranks have completed the picture; false if more splats waited in one than it had memory for.
 /// Throws what this rank's painter threw, or OtherPainterFailure if another rank's did.
 bool FramePipeline::isOfAll(const FrameOptions& options) const {
-  if (!options.ranks) return !overfull_;
   std::array<uint64_t, 2> numbers{overfull_ ? 1u : 0u, failure_ ? 1u : 0u};
   options.ranks->sum(numbers);
   if (failure_) std::rethrow_exception(failure_);
@@ -440,7 +430,7 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
   const size_t waiting = painting_ == backend_.get() ? pools_->budget.waiting_splats : aside_waiting_splats_;
   failure_ = nullptr;
   painting_->run([&](Painter& own) {
-    Painter& painter = options.ranks ? enduring_.emplace(own) : own;
+    Painter& painter = options.ranks->alone() ? own : enduring_.emplace(own);
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
                   {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers,
                    planner_.colourClasses(), static_cast<float>(plan.settings.view.low_pass_px2)},
@@ -468,7 +458,7 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     if (on_card) *on_card = painter.endOnCard();
     if (!on_card || !*on_card) image = painter.end();
     overfull_ = painter.isOverfull();
-    if (options.ranks) failure_ = enduring_->failure();
+    if (!options.ranks->alone()) failure_ = enduring_->failure();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
     statistics.draw_s = painter.drawSeconds();
@@ -485,7 +475,11 @@ Image FramePipeline::paint(const FramePlan& plan, std::span<const FrameRegion> r
     statistics.card_read_bytes = card.read_bytes;
     statistics.card_pixels_listed = card.pixels_listed;
     statistics.card_pixels_blended = card.pixels_blended;
-    if (!stored_.empty()) add(statistics, painter.store()->counts());
+    if (!stored_.empty()) {
+      const ProjectionCounts counts = painter.store()->counts();
+      statistics.card_splats = counts.read;
+      add(statistics, counts);
+    }
   });
   if (const ShadowGrid* const shadows = plan.settings.shadows.get()) {
     PrepareStatistics unreadable;

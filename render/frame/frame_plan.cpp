@@ -341,21 +341,21 @@ FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options) 
 
 void FramePlanner::share(FramePlan& plan, const FrameOptions& options) const {
   Ranks& ranks = *options.ranks;
-  auto shared = std::make_shared<SharedParts>();
-  shared->parts = plan.parts;
-  shared->elements = BrickProjector::kMaxSplats + (coloured_by_ ? kMaxBrickSplats : 0);
-  shared->size = options.size;
+  if (ranks.alone()) return;
+  SharedParts& shared = plan.shared;
+  shared.parts = plan.parts;
+  shared.elements = BrickProjector::kMaxSplats + (coloured_by_ ? kMaxBrickSplats : 0);
+  shared.size = options.size;
   if (ranks.isFirst()) {
     const std::vector<PartCost> costs =
         partCosts(plan.parts, cache_.bricks(), cache_.brickVariables(variable_), plan.settings.view);
     PictureShares shares = sharePicture(costs, options.size, ranks.count());
-    shared->owners = std::move(shares.owners);
-    shared->preparers = std::move(shares.preparers);
+    shared.owners = std::move(shares.owners);
+    shared.preparers = std::move(shares.preparers);
   }
-  shared->owners = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared->owners)));
-  shared->preparers = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared->preparers)));
-  plan.shared = shared;
-  plan.tiles = std::make_shared<TileSet>(options.size, shared->owners, ranks.rank());
+  shared.owners = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared.owners)));
+  shared.preparers = fromBytes<uint32_t>(ranks.broadcast(toBytes(shared.preparers)));
+  plan.tiles = std::make_shared<TileSet>(options.size, shared.owners, ranks.rank());
   if (options.keep_going) return;  // an ancestor that replaces a damaged brick reaches out of its box
   plan.parts_elsewhere = std::erase_if(plan.parts, [&](const SweptPart& part) {
     return !plan.tiles->touches(screenBoxOf(cache_.bricks()[part.part.brick], plan.settings.view));

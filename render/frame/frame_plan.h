@@ -62,7 +62,7 @@ struct FramePlan {
   std::shared_ptr<const PixelLayers> layers = nullptr;  // those of settings, where there are some
   uint64_t parts_hidden = 0;                            // of the cut, behind opaque layers: not in `parts`
   std::shared_ptr<const TileSet> tiles = nullptr;       // of this rank; null: all
-  std::shared_ptr<const SharedParts> shared = nullptr;  // with other ranks; null: alone
+  SharedParts shared = {};                              // with other ranks; empty where there are none
   uint64_t parts_elsewhere = 0;                         // of the cut, in others' tiles: not in `parts`
   BrickSource::Mergings mergings = {};                  // of the parts: BrickPart::merging
 };
@@ -101,7 +101,8 @@ class FramePlanner {
   }
 
   /// Deals the picture and the parts to be prepared out to options.ranks, and leaves out of plan.parts what
-  /// lies in the tiles of others. Nothing is left out if `keep_going`. All ranks have to call it.
+  /// lies in the tiles of others. Nothing is left out if `keep_going`. All ranks have to call it; one
+  /// alone keeps all.
   void share(FramePlan& plan, const FrameOptions& options) const;
 
   /// Puts the layers of its scene into a plan. Leaves out the parts that lie behind opaque layers at all of

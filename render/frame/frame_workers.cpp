@@ -8,6 +8,15 @@
 
 namespace curvisplat {
 
+void add(PrepareStatistics& statistics, const ProjectionCounts& counts) {
+  statistics.splats_read += counts.read;
+  statistics.splats_clipped += counts.clipped;
+  statistics.splats_behind += counts.hidden;
+  statistics.splats_off_screen += counts.off_screen;
+  statistics.splats_transparent += counts.transparent;
+  statistics.splats_drawn += counts.drawn;
+}
+
 /// The buffers that a worker keeps from brick to brick, so that preparing a brick allocates nothing.
 struct FrameWorkers::Worker {
   BrickSource::Scratch scratch;
@@ -110,7 +119,7 @@ void FrameWorkers::loop(Worker& worker) {
   try {
     while (true) {
       if (const auto batch = sweep_.next()) {
-        if (!hand(worker, *batch)) return;
+        if (!submit(worker, *batch)) return;
         continue;
       }
       const uint64_t sequence = next_++;
@@ -123,7 +132,7 @@ void FrameWorkers::loop(Worker& worker) {
   }
 }
 
-/// Hands on what is left of a slab that has all its parts.
+/// Submits what is left of a slab that has all its parts.
 void FrameWorkers::endSlab(Worker& worker) {
   while (true) {
     std::optional<SweepBuffer::Batch> batch;
@@ -132,7 +141,7 @@ void FrameWorkers::endSlab(Worker& worker) {
       batch = sweep_.awaitNext();
     }
     if (!batch) break;
-    if (!hand(worker, *batch)) return;
+    if (!submit(worker, *batch)) return;
   }
   ring_.pauseAfter(sweep_.batches());
 }
@@ -166,9 +175,9 @@ void FrameWorkers::exchangeLoop() {
 void FrameWorkers::sharedLoop(Worker& worker) {
   try {
     while (true) {
-      const bool may_hand = ring_.hasSpaceFor(SweepBuffer::kMaxBatch);
-      if (const auto batch = may_hand ? sweep_.next() : std::nullopt) {
-        if (!hand(worker, *batch)) return;
+      const bool may_submit = ring_.hasSpaceFor(SweepBuffer::kMaxBatch);
+      if (const auto batch = may_submit ? sweep_.next() : std::nullopt) {
+        if (!submit(worker, *batch)) return;
       } else if (const auto sequence = work_->exchange->nextReceived()) {
         if (!enterReceived(worker, *sequence)) return;
       } else if (const auto index = work_->exchange->nextToPrepare()) {
@@ -197,7 +206,7 @@ bool FrameWorkers::prepareShared(Worker& worker, size_t index) {
   project(worker, *fetched, part.keys);
   count(worker, prepared_[number] != 0);
   prepared_[number] = 1;
-  exchange.give(index, worker.projector.splats(), worker.keys);
+  exchange.submit(index, worker.projector.splats(), worker.keys);
   return true;
 }
 
@@ -314,13 +323,7 @@ void FrameWorkers::count(Worker& worker, bool again) {
     ++statistics.bricks_again;
     return;
   }
-  const ProjectionCounts& counts = worker.projector.counts();
-  statistics.splats_read += counts.read;
-  statistics.splats_clipped += counts.clipped;
-  statistics.splats_behind += counts.hidden;
-  statistics.splats_off_screen += counts.off_screen;
-  statistics.splats_transparent += counts.transparent;
-  statistics.splats_drawn += counts.drawn;
+  add(statistics, worker.projector.counts());
 }
 
 /// Ends the turn of a part that is hidden or lies behind the slab.
@@ -346,7 +349,7 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t brick, cons
   std::shared_ptr<SweepBuffer::Run> run;
   while (!(run = sweep_.enter(brick, sorted))) {
     if (const auto batch = sweep_.nextFinal()) {
-      if (!hand(worker, *batch)) return false;
+      if (!submit(worker, *batch)) return false;
       continue;
     }
     const WaitTimer timer(statistics.workers_waited_s, "wait for space");
@@ -358,7 +361,7 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t brick, cons
 }
 
 /// Sorts a batch into its segment of the ring.
-bool FrameWorkers::hand(Worker& worker, const SweepBuffer::Batch& batch) {
+bool FrameWorkers::submit(Worker& worker, const SweepBuffer::Batch& batch) {
   std::span<const DepthItem> sorted;
   std::optional<std::span<ScreenSplat>> segment;
   {

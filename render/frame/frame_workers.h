@@ -52,6 +52,9 @@ struct SamplingWork {
   std::optional<BrickSource::Variables> variables = std::nullopt;  // none: the picture's
 };
 
+/// Adds the counts of splats that were projected.
+void add(PrepareStatistics& statistics, const ProjectionCounts& counts);
+
 class FrameWorkers {
  public:
   /// Starts `count` threads, named "prepare", which hold a permit while they compute. The other arguments must outlive them.
@@ -112,7 +115,7 @@ class FrameWorkers {
   };
   bool enter(Worker& worker, uint64_t sequence, uint32_t brick, const Projected& projected);
   void project(Worker& worker, const BrickSource::Splats& fetched, const KeyRange& keys);
-  bool hand(Worker& worker, const SweepBuffer::Batch& batch);
+  bool submit(Worker& worker, const SweepBuffer::Batch& batch);
   std::optional<BrickSource::Splats> fetch(Worker& worker, uint64_t sequence, const BrickPart& part,
                                            bool keep_going);
   void count(Worker& worker, bool again);

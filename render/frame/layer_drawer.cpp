@@ -1,4 +1,4 @@
-#include "render/frame/frame_pipeline.h"
+#include "render/frame/layer_drawer.h"
 
 #include <fmt/format.h>
 
@@ -38,7 +38,6 @@ uint64_t isoTracerBytes(const FrameOptions& options) {
 
 /// The bricks of a slice that this rank samples.
 SlicePlan shareOf(const SlicePlan& slice, const FrameOptions& options) {
-  if (!options.ranks) return slice;
   SlicePlan share{slice.plane, {}, slice.complete};
   for (size_t n = options.ranks->rank(); n < slice.parts.size(); n += options.ranks->count())
     share.parts.push_back(slice.parts[n]);
@@ -122,7 +121,6 @@ void LayerDrawer::draw(FramePlan& plan, const FrameOptions& options, const Sampl
       if (opacities) opacities->add(cell_min, splats.geometry, splats.values, splats.ranges);
     };
     sample({cache_, share.parts, take, options.keep_going});
-    if (!options.ranks) continue;
     samplers.back()->addOthers(*options.ranks);
     if (opacities) opacities->addOthers(*options.ranks);
   }

@@ -45,7 +45,7 @@ void FramePipeline::fillStore(const FramePlan& plan, const FrameOptions& options
   unread_.clear();
   if (painting_ != backend_.get()) return;  // after a picture of the same splats
   is_storing_ = false;
-  if (options.ranks || options.keep_going) return;
+  if (!options.ranks->alone() || options.keep_going) return;
   std::vector<uint32_t> numbers;
   for (uint32_t number = 0; number < plan.parts.size(); ++number) {
     const SweptPart& part = plan.parts[number];

@@ -127,11 +127,11 @@ struct GlFunctions {
   /// contexts refuse.
   std::string whyNoCompute() const;
 
-  /// Throws PainterFailure if a call has failed since the last check: "OpenGL failed while <doing>: <error>"; where memory is
-  /// what lacks, CardMemoryFailure.
+  /// Throws PainterFailure if a call has failed since the last check: "OpenGL failed while <doing>: <error>"; where memory
+  /// ran out, CardMemoryFailure.
   void check(std::string_view doing) const;
-  /// Throws PainterFailure if the card was reset, so that what was drawn is lost; only contexts know that were asked to
-  /// tell.
+  /// Throws PainterFailure if the card was reset, so that what was drawn is lost. Only a context that was created to notify
+  /// of resets knows.
   void checkReset(std::string_view doing) const;
 
  private:

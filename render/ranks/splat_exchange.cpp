@@ -160,7 +160,8 @@ void SplatExchange::skip(size_t index) {
   prepared_bytes_ -= shared_.elements * kPreparedBytes;
 }
 
-void SplatExchange::give(size_t index, std::span<const ScreenSplat> splats, std::span<const uint32_t> keys) {
+void SplatExchange::submit(size_t index, std::span<const ScreenSplat> splats,
+                           std::span<const uint32_t> keys) {
   CURVISPLAT_CHECK_OP(splats.size(), ==, keys.size());
   CURVISPLAT_CHECK_OP(splats.size(), <=, shared_.elements);
   Prepared& part = prepared_[index];

@@ -2,7 +2,7 @@
 // decoded and projected by one rank, its preparer, which sends each of its splats to the ranks whose tiles
 // it touches.
 //
-//   preparer   nextToPrepare() -> project -> give()          all workers
+//   preparer   nextToPrepare() -> project -> submit()        all workers
 //                                              |
 //              step()   offers -> grants -> splats           one thread, at all ranks at the same time
 //                                              |
@@ -77,13 +77,13 @@ class SplatExchange {
   const std::vector<uint32_t>& toPrepare() const { return own_; }
 
   /// The next of toPrepare(), as an index, if there is space for its splats; nullopt: none until the next
-  /// step. The caller calls give() or skip() next. Any thread.
+  /// step. The caller calls submit() or skip() next. Any thread.
   std::optional<size_t> nextToPrepare();
   /// Whether nobody needs a brick that this rank was to prepare any more. Once true, it stays so. Any
   /// thread.
   bool isUnneeded(uint32_t brick) const;
   /// Takes the splats of a part.   splats, keys [n]  as projected: records before their splat, with its key
-  void give(size_t index, std::span<const ScreenSplat> splats, std::span<const uint32_t> keys);
+  void submit(size_t index, std::span<const ScreenSplat> splats, std::span<const uint32_t> keys);
   void skip(size_t index);
 
   struct Received {

@@ -52,7 +52,7 @@ class Dealer {
  private:
   /// Gives the tiles of a box to the ranks first .. first + ranks - 1. `parts`: those that touch it.
   void divide(const TileBox& box, uint32_t first, uint32_t ranks, const std::vector<uint32_t>& parts) {
-    if (ranks == 1) return give(box, first);
+    if (ranks == 1) return assign(box, first);
     bool vertical = false;
     int place = 0;
     uint32_t share = 1;
@@ -76,7 +76,7 @@ class Dealer {
         }
       }
     }
-    if (place == 0) return give(box, first);
+    if (place == 0) return assign(box, first);
     TileBox low = box, high = box;
     if (vertical)
       low.y1 = high.y0 = box.y0 + place;
@@ -86,7 +86,7 @@ class Dealer {
     divide(high, first + share, ranks - share, touching(high, parts));
   }
 
-  void give(const TileBox& box, uint32_t rank) {
+  void assign(const TileBox& box, uint32_t rank) {
     for (int y = box.y0; y < box.y1; ++y)
       for (int x = box.x0; x < box.x1; ++x) owners_[static_cast<size_t>(y * columns_ + x)] = rank;
   }

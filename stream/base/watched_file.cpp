@@ -84,6 +84,10 @@ void noteLinks(const std::filesystem::path& from, const std::set<std::filesystem
   links().add(from, to);
 }
 
+std::set<std::filesystem::path> linkedFilesOf(const std::filesystem::path& from) {
+  return links().of(from);
+}
+
 Mutex& linksMutex() {
   return links().mutex;
 }
@@ -93,7 +97,7 @@ WatchedFiles::WatchedFiles(const std::vector<std::string>& names) {
   std::set<std::filesystem::path> known(files.begin(), files.end());
   for (size_t n = 0; n < files.size(); ++n) {
     files_.emplace_back(files[n]);
-    for (const std::filesystem::path& next : links().of(files[n]))
+    for (const std::filesystem::path& next : linkedFilesOf(files[n]))
       if (known.insert(next).second) files.push_back(next);
   }
 }

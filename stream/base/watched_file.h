@@ -51,6 +51,9 @@ class WatchedFile {
 /// Notes that a file leads to others, for WatchedFiles that are made later. Any thread.
 void noteLinks(const std::filesystem::path& from, const std::set<std::filesystem::path>& to);
 
+/// The files that noteLinks() noted for this one. Any thread.
+std::set<std::filesystem::path> linkedFilesOf(const std::filesystem::path& from);
+
 /// Guards what noteLinks() notes. Whoever holds it while the process forks finds it free in both processes.
 Mutex& linksMutex();
 

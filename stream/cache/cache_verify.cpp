@@ -6,9 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
 
-#include "stream/base/checksum.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/value_histogram.h"
@@ -250,16 +248,8 @@ class Verifier {
   void verifyGrids() {
     const std::filesystem::path path = reader_.path() / "bricks.vdb";
     try {
-      const InputFile file(cacheFile(reader_.path(), "bricks.vdb"));
-      if (file.size() > kMaxGridBytes * (bricks_.size() + 1))
-        return find("{}: is too large for {} bricks (found {} bytes)", path.string(), bricks_.size(),
-                    file.size());
-      std::vector<std::byte> bytes(file.size());
-      file.readAt(0, std::span(bytes));
-      const FileInfo* const info = reader_.manifest().file("bricks.vdb");
-      if (info && info->checksum != checksumOf(bytes))
-        return find("{}: has a wrong checksum (found {:016x}, expected {:016x})", path.string(),
-                    checksumOf(bytes), info->checksum);
+      const std::vector<std::byte> bytes =
+          readListed(reader_.path(), "bricks.vdb", reader_.manifest(), kMaxGridBytes * (bricks_.size() + 1));
       const auto [difference, not_compared] = compareBrickGrids(bytes, reader_.manifest().root, bricks_);
       if (!difference.empty()) find("{}: {}", path.string(), difference);
       if (!not_compared.empty())

@@ -31,6 +31,8 @@ std::string facesFileOfVariable(uint32_t number);
 std::string facesFileOfStep(uint64_t step);
 /// Faces between drawn and blanked cells: each is a patch of strips of quads, without levels of detail.
 inline constexpr const char* kBlanksFileName = "faces.blanks.bin";
+/// The name of these faces in options and saved views. They have no values.
+inline constexpr const char* kBlanks = "blanks";
 /// Whether the name is that of any file of faces.
 bool isFacesFile(const std::string& name);
 inline constexpr std::array<char, 8> kFacesMagic{'C', 'V', 'S', 'f', 'a', 'c', 'e', 's'};

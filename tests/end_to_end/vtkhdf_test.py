@@ -8,6 +8,7 @@ python3-vtk9 or python3-h5py.
 import json
 import os
 import struct
+import subprocess
 import sys
 import unittest
 
@@ -534,6 +535,30 @@ class VtkHdf(MeshFormats):
             root.create_group("Assembly")["again"] = h5py.SoftLink("/VTKHDF")
             root["Assembly/loop"] = h5py.SoftLink("/VTKHDF/Assembly")
         self.expect_same([self.path], mesh.vtk())
+
+    def test_kept_cache_of_a_file_whose_link_leads_to_new_values(self):
+        mesh = Mesh(2)
+        with self.file() as f:
+            write_mesh(f.create_group("VTKHDF"), [mesh])
+            p = np.array(f["VTKHDF/PointData/p"])
+            del f["VTKHDF/PointData/p"]
+            f["VTKHDF/PointData/p"] = h5py.ExternalLink("values.h5", "p")
+        environment = {**os.environ, "XDG_CACHE_HOME": str(self.folder / "kept")}
+
+        def ranges(values):
+            """The range of p in each kept cache after the file was drawn twice, linked to these values."""
+            with h5py.File(self.folder / "values.h5", "w") as f:
+                f["p"] = values
+            for _ in range(2):
+                subprocess.run([PROGRAM, "render", self.path, "-o", self.folder / "a.png", "--size", "20x20", "--scalar", "p"],
+                               check=True, capture_output=True, env=environment)
+            manifests = [json.loads(path.read_text()) for path in (self.folder / "kept").glob("*/*/*.splats/manifest.json")]
+            return sorted(float(np.float32(variable["max"])) for manifest in manifests for variable in manifest["variables"] if variable["name"] == "p")
+
+        first, second = (float(np.float32(largest)) for largest in (p.max(), 2 * p.max()))
+        self.assertEqual(ranges(p), [first])
+        self.assertEqual(ranges(2 * p), [first, second])
+        self.assertEqual(ranges(p), [first, second])
 
     def test_damage(self):
         with self.file() as f:

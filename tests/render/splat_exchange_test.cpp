@@ -67,7 +67,7 @@ TEST(SplatExchange, HoldsNoMoreThanItsBuffers) {
     while (exchange.step([](uint64_t) { return false; })) {
       while (const auto sequence = exchange.nextReceived())
         received[ranks.rank()] += exchange.received(*sequence).value().splats.size();
-      while (const auto index = exchange.nextToPrepare()) exchange.give(*index, splats, keys);
+      while (const auto index = exchange.nextToPrepare()) exchange.submit(*index, splats, keys);
       most[ranks.rank()] = std::max<uint64_t>(most[ranks.rank()], mallinfo2().hblkhd);
     }
   });
@@ -97,7 +97,7 @@ TEST(SplatExchange, PreparesInRounds) {
       std::vector<size_t>& round = prepared[ranks.rank()].emplace_back();
       while (const auto index = exchange.nextToPrepare()) {
         round.push_back(exchange.toPrepare()[*index]);
-        exchange.give(*index, splats, keys);
+        exchange.submit(*index, splats, keys);
       }
     }
   });

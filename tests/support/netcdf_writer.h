@@ -1,5 +1,5 @@
 // Writes small NetCDF files: dimensions, variables with attributes, and values that a function of the indices
-// says.
+// gives.
 #pragma once
 
 #include <cstddef>

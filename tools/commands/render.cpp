@@ -235,7 +235,7 @@ void render(const RenderArguments& given) {
   Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
   const StopRanksWith stopping_ranks(ranks, progress);
-  const bool writes_own = !options.ranks && !isMovieName(arguments.output);
+  const bool writes_own = options.ranks->alone() && !isMovieName(arguments.output);
   const auto output = ranks.isFirst() || writes_own
                           ? makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s)
                           : nullptr;

@@ -175,7 +175,7 @@ class FrameRun {
 
   void draw(const MotionInTime& motion, const std::vector<uint64_t>& numbers) {
     const bool moves = severalFrames(arguments_);
-    const bool dealt = !ranks_.alone() && !report_.options.ranks;
+    const bool dealt = areFramesDealt();
     const std::vector<uint64_t> own = dealt ? ownOf(numbers) : numbers;
     const size_t rounds = dealt ? (numbers.size() + ranks_.count() - 1) / ranks_.count() : numbers.size();
     if (moves) progress_.begin("drawing", own.size(), "frames");
@@ -195,6 +195,9 @@ class FrameRun {
     for (size_t n = ranks_.rank(); n < numbers.size(); n += ranks_.count()) own.push_back(numbers[n]);
     return own;
   }
+
+  /// Whether each rank draws pictures of its own.
+  bool areFramesDealt() const { return !ranks_.alone() && report_.options.ranks->alone(); }
 
   /// The pictures that the ranks have drawn, into the movie at rank 0.
   void writeRound(const std::vector<uint64_t>& numbers, size_t round) {
@@ -266,7 +269,7 @@ class FrameRun {
     }
     if (number > 0 || arguments_.first_image.empty()) {
       Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
-      if (next && !report_.options.ranks) prefetch(motion, *next);
+      if (next && report_.options.ranks->alone()) prefetch(motion, *next);
       finish({number, time, camera, statistics}, std::move(image));
       return;
     }
@@ -293,7 +296,7 @@ class FrameRun {
   }
 
   void finish(FrameReport frame, Image image) {
-    if (report_.options.ranks) {
+    if (!report_.options.ranks->alone()) {
       for (const Ranks::Bytes& bytes : ranks_.gather(packStatistics({frame})))
         frame.of_ranks.push_back(unpackStatistics(bytes).front().statistics);
       if (!ranks_.isFirst()) return;
@@ -311,7 +314,7 @@ class FrameRun {
     if (report_.frames.empty() && !empty)
       poor = poorPictureWarning(image, scene, givenFunctionOptions(arguments_.scalar));
     annotate(std::move(image), frame, [&](const Image& picture) {
-      if (isMovieName(arguments_.output) && !ranks_.alone() && !report_.options.ranks)
+      if (isMovieName(arguments_.output) && areFramesDealt())
         picture_ = picture;  // for rank 0
       else if (channels_.any())
         output_->writeWith(number, picture, imageChannels(channels_, values_, report_.picture));

@@ -10,12 +10,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/open/grid_endings.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
+#include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/grid_faces.h"
@@ -179,6 +182,9 @@ ConversionServices conversionServices(ValuePrecision precision) {
   };
   services.add_scalar = addFurtherScalar;
   services.is_grid_folder = isGridFolder;
+  for (const GridEndings& of_format : kGridEndings)
+    for (const std::string_view ending : wordsOf(of_format.endings))
+      services.grid_endings.emplace_back(ending);
   services.example = exampleFiles;
   return services;
 }

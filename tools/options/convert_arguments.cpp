@@ -28,6 +28,7 @@
 #include "stream/base/memory.h"
 #include "stream/base/name_list.h"
 #include "stream/base/progress.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/series.h"
 #include "tools/options/default_scalars.h"
 #include "tools/options/grid_surfaces.h"

@@ -10,6 +10,7 @@
 #include "stream/base/error.h"
 #include "stream/base/name_list.h"
 #include "stream/base/text.h"
+#include "stream/cache/faces_file.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/still_faces.h"
 

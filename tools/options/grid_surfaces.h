@@ -36,9 +36,6 @@ struct FaceName {
 /// nullopt if the text has another form: the name of a boundary.
 std::optional<FaceName> parseFaceName(std::string_view text);
 
-/// The name of the faces between drawn and blanked cells, in an option of their own. They have no values.
-inline constexpr const char* kBlanks = "blanks";
-
 /// The faces that `text` names, one name or several separated by commas. Throws Error that lists the names
 /// there are. Colours are not set.
 GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,

@@ -18,6 +18,8 @@
 #include <thread>
 #include <utility>
 
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/library_trial.h"
 #include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/common/unpacked_file.h"
 #include "preprocess/formats/open/open_grid.h"
@@ -73,41 +75,68 @@ fs::path memoOf(const fs::path& path, const fs::path& known) {
   return known / fmt::format("{:016x}", checksumOfText(fs::weakly_canonical(path, ignored).string()));
 }
 
-std::optional<uint64_t> notedChecksum(const fs::path& memo, const std::string& stamp) {
-  constexpr uint64_t kMaxMemo = 1 << 16;
+/// A note of a file: the checksum of its bytes, and the files that it leads to (tryHdf5()).
+struct FileNote {
+  uint64_t checksum = 0;
+  std::set<fs::path> linked = {};
+};
+
+std::optional<FileNote> notedOf(const fs::path& memo, const std::string& stamp) {
+  constexpr uint64_t kMaxMemo = 1 << 20;
   std::error_code error;
   if (!fs::is_regular_file(memo, error)) return std::nullopt;
   try {
     std::istringstream text(readTextFile(memo, kMaxMemo));
-    std::string before;
-    uint64_t checksum = 0;
+    std::string before, linked;
+    FileNote note;
+    size_t count = 0;
     // A note that a power loss has cut short has no line's end.
-    if (std::getline(text, before) && before == stamp && text >> checksum && text.get() == '\n')
-      return checksum;
+    if (!std::getline(text, before) || before != stamp || !(text >> note.checksum >> count) ||
+        text.get() != '\n')
+      return std::nullopt;
+    while (std::getline(text, linked) && !text.eof()) note.linked.insert(linked);
+    if (note.linked.size() == count) return note;
   } catch (const Error&) {
     // The file's own bytes are as good.
   }
   return std::nullopt;
 }
 
-/// Notes a file's checksum. Several processes may open one file for the first time, so it is written under
+/// Notes it for the next process. Several processes may open one file for the first time, so it is written under
 /// another name first. A note that cannot be written, or that a power loss takes, is missed by the next process only; so none is synced,
 /// which would take longer than all else where there are thousands.
-void noteChecksum(const fs::path& memo, const std::string& stamp, uint64_t checksum) {
+void note(const fs::path& memo, const std::string& stamp, const FileNote& of_file) {
   const fs::path written = memo.string() + fmt::format(".{}", ::getpid());
-  std::ofstream(written) << fmt::format("{}\n{}\n", stamp, checksum);
+  std::ofstream out(written);
+  out << fmt::format("{}\n{} {}\n", stamp, of_file.checksum, of_file.linked.size());
+  for (const fs::path& linked : of_file.linked) out << linked.string() << '\n';
+  out.close();
   std::error_code error;
   fs::rename(written, memo, error);
   if (error) fs::remove(written, error);
+}
+
+/// The files that a file of HDF5 leads to, from `known` if it has not changed since; nullopt where it leads out of its folder, or is
+/// damaged: whoever opens it reports that.
+std::optional<std::set<fs::path>> linkedBy(const fs::path& path, const fs::path& known) {
+  if (beginningOf(InputFile(path), kHdf5Signature.size()) != kHdf5Signature) return std::set<fs::path>{};
+  if (const auto noted = notedOf(memoOf(path, known), stampOf(path))) return noted->linked;
+  try {
+    tryHdf5(path);
+    return linkedFilesOf(path);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
 }
 
 /// The checksum of a file's bytes, from `known` if it has not changed since. `stamp`: of the file, before.
 uint64_t checksumOf(const fs::path& path, const std::string& stamp, const fs::path& known,
                     Progress& progress) {
   const fs::path memo = memoOf(path, known);
-  if (const std::optional<uint64_t> checksum = notedChecksum(memo, stamp)) return *checksum;
+  if (const auto noted = notedOf(memo, stamp)) return noted->checksum;
   const uint64_t checksum = checksumOfFile(path, progress);
-  if (stampOf(path) == stamp) noteChecksum(memo, stamp, checksum);
+  if (const auto linked = linkedBy(path, known); linked && stampOf(path) == stamp)
+    note(memo, stamp, {checksum, *linked});
   return checksum;
 }
 
@@ -208,11 +237,12 @@ std::vector<fs::path> filesNamed(const std::string& name, const fs::path& file) 
   return found;
 }
 
-/// A grid's files with those that they name, and when these were changed last.
+/// A grid's files with those that they name or link to, and when these were changed last.
 class StampedFiles {
  public:
-  /// Throws Interrupted.
-  StampedFiles(const std::vector<fs::path>& files, const Progress& progress) : progress_(progress) {
+  /// `known`: the folder of notes. Throws Interrupted.
+  StampedFiles(const std::vector<fs::path>& files, const fs::path& known, const Progress& progress)
+      : known_(known), progress_(progress) {
     for (const fs::path& file : files) add(file, 0);
     for (const fs::path& file : all_) stamps_.push_back(stampOf(file));
   }
@@ -232,6 +262,8 @@ class StampedFiles {
     if (fs::is_directory(file, error)) return addFolder(file, {});
     if (!seen_.emplace(depth, file.lexically_normal()).second) return;
     all_.push_back(file);
+    if (const auto files = linkedBy(file, known_))
+      for (const fs::path& linked : *files) add(linked, depth);
     constexpr int kMaxDepth = 3;  // a .pvd of .vtm of .vts
     if (depth == kMaxDepth) return;
     constexpr size_t kMaxPatterns = 1000;  // each lists a folder
@@ -275,6 +307,7 @@ class StampedFiles {
     std::sort(all_.begin() + begin, all_.end());
   }
 
+  const fs::path known_;
   const Progress& progress_;
   std::set<std::pair<int, fs::path>> seen_;
   std::vector<fs::path> all_;
@@ -366,8 +399,9 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
   std::error_code error;
   makePrivateFolders(*folder / "known");  // a grid may be its owner's alone to read
   const std::vector<fs::path> files = wholePaths(given_files);
-  const StampedFiles stamped(files, progress);
-  const uint64_t contents = contentsOf(files, stamped, *folder / "known", progress);
+  const fs::path known = *folder / "known";
+  const StampedFiles stamped(files, known, progress);
+  const uint64_t contents = contentsOf(files, stamped, known, progress);
   const fs::path place = *folder / fmt::format("{:016x}-{}", contents, wordOf(precision));
   const fs::path cache = place / (files.front().stem().string() + ".splats");
   makePrivateFolders(place);
@@ -376,7 +410,7 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
     removeChanged(place, cache);
     if (!fs::exists(cache / "manifest.json", error)) {
       makeKeptCache(files, cache, progress, events, scalars, precision);
-      if (const StampedFiles now(files, progress);
+      if (const StampedFiles now(files, known, progress);
           now.all() != stamped.all() || now.stamps() != stamped.stamps()) {
         writeFileDurably(place / kChanged, "");
         events.say(fmt::format(

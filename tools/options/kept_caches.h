@@ -6,7 +6,7 @@
 //   <folder>/<key>/series.*         the cache of a series, to which NAME.splats links once it is complete
 //   <folder>/<key>/used             its time: when it was opened last; locked while it is made
 //   <folder>/<key>/changed          the files changed meanwhile: the cache is made again by the next who opens them
-//   <folder>/known/<file>           checksum of a file that has not changed since, by its path
+//   <folder>/known/<file>           checksum of a file that has not changed since, by its path, and the files that it links to (HDF5)
 //
 // When they take more than the limit (CURVISPLAT_CACHE_SIZE, default 20G), those that were not used for longest are
 // removed. Readers that have one open keep what they have read.

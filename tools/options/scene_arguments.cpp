@@ -21,6 +21,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
+#include "stream/cache/faces_file.h"
 #include "tools/options/globe_arguments.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"

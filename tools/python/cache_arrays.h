@@ -15,8 +15,7 @@
 
 namespace curvisplat::python {
 
-/// The choice of the data to take. The level is the octree's, or, if there is none, chosen for the lattice;
-/// of points it is the finest.
+/// The data that are asked for. Without a level of the octree, a lattice takes the level that suits it, points take the finest.
 struct DataChoice {
   std::string scalar;
   std::array<double, 3> lower{}, upper{};
@@ -33,10 +32,9 @@ pybind11::tuple sampledArrays(const CacheReader& cache, const DataChoice& choice
 pybind11::tuple pointArrays(const CacheReader& cache, const DataChoice& choice,
                             const pybind11::object& progress);
 
-/// The values at points: for each scalar its values at the points and at the samples next to them, and of
-/// these the block, the indices and the places, as joinedValues() has them; NaN, and block 0, outside of the
-/// data. `sets`: the cache, and those of its scalars with blanks of their own. `source`: null for the caches
-/// alone, or files; none: those that they name.
+/// Probes points. Returns, as joinedValues() does, each scalar's value at the points and at the samples next to them, and the block, the
+/// indices and the places of these samples; outside of the data NaN, and block 0. `sets`: the cache, and those of its scalars with
+/// blanks of their own. `source`: the grid's files; empty: those that the cache names; nullopt: the cache alone is read.
 pybind11::tuple probedArrays(const std::vector<const CacheReader*>& sets,
                              const std::vector<std::array<double, 3>>& points,
                              const std::optional<std::vector<std::filesystem::path>>& source);

@@ -1,5 +1,5 @@
-// The functions of curvisplat-vdb.so. They have the names of those that load it (brick_grids.h,
-// counting_grid.h, fog_volume.h), in a namespace of their own.
+// The functions of curvisplat-vdb.so. The functions that load it and call them (brick_grids.h, counting_grid.h,
+// fog_volume.h) have the same names, in another namespace.
 #pragma once
 
 #include <cstddef>

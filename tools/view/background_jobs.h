@@ -72,6 +72,7 @@ struct ConversionServices {
       add_scalar;
   /// Whether a folder is the grid of one format, such as a Zarr store or an OpenFOAM case. Fast.
   std::function<bool(const std::filesystem::path& folder)> is_grid_folder;
+  std::vector<std::string> grid_endings = {};  // of names of grids' files: ".vtu"
   /// The files of an example, which to_cache() writes where they are missing.
   std::function<Paths()> example;
 };

@@ -18,6 +18,7 @@
 #include "stream/base/file.h"
 #include "stream/base/json_document.h"
 #include "stream/base/text.h"
+#include "stream/cache/faces_file.h"
 
 namespace curvisplat {
 namespace {
@@ -291,8 +292,6 @@ void addIsosurfaces(const ViewState& state, CommandLine& words) {
     words.add("--iso-colour", fmt::format("{}", fmt::join(colours, ",")));
   if (!groups.empty() && !state.iso_opacity.opaque()) words.add("--iso-opacity", text(state.iso_opacity));
 }
-
-constexpr const char* kBlanks = "blanks";  // faces without values, as --surface names them
 
 /// Adds options for surfaces, slices (but for a film's) and isosurfaces, except for those that are hidden.
 void addSurfaces(const ViewState& state, bool has_slices, CommandLine& words) {

@@ -281,7 +281,8 @@ class Viewer {
   Window window_;
   Toasts toasts_;
   Reports reports_{toasts_, glfwGetTime};
-  FileDialog dialog_{options_.conversion.is_grid_folder, settings_.data_folder};
+  FileDialog dialog_{options_.conversion.is_grid_folder, options_.conversion.grid_endings,
+                     settings_.data_folder};
   OpenedView opened_{options_, {window_, reports_, dialog_, settings_, [this] { return pictureSize(); }}};
   std::unique_ptr<BackgroundJob> movie_;  // that is being drawn
   bool saves_picture_ = false;            // it is one picture

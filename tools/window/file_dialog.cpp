@@ -30,22 +30,10 @@ struct Look {
   std::vector<std::string> endings = {};
 };
 
-/// The endings of what is read (FORMATS.md), without those of compressed files.
-const std::vector<std::string>& dataEndings() {
-  static const std::vector<std::string> endings{
-      ".splats", ".p3d",  ".xyz",    ".x",    ".g",   ".grd",  ".grid", ".q",    ".f",      ".fun",
-      ".fmt",    ".bin",  ".dat",    ".vts",  ".vtr", ".vti",  ".vtu",  ".pvts", ".pvtr",   ".pvti",
-      ".pvtu",   ".vtm",  ".vtmb",   ".vtpd", ".vth", ".vthb", ".pvd",  ".vtk",  ".vtkhdf", ".hdf",
-      ".hdf5",   ".h5",   ".series", ".cgns", ".adf", ".nc",   ".nc4",  ".cdf",  ".netcdf", ".zip",
-      ".zarr",   ".case", ".encas",  ".tec",  ".tp",  ".plt",  ".xmf",  ".xdmf", ".foam",   ".msh",
-      ".e",      ".ex2",  ".exo",    ".exii", ".su2", ".csv"};
-  return endings;
-}
-
 Look lookOf(FileDialog::Purpose purpose) {
   switch (purpose) {
     case FileDialog::Purpose::kOpenData:
-      return {"Open a cache or a grid", "Open", false, dataEndings()};
+      return {"Open a cache or a grid", "Open"};  // of FileDialog::data_endings_
     case FileDialog::Purpose::kLoadFunction:
       return {"Load colours and opacities", "Load", false, {".json"}};
     case FileDialog::Purpose::kSaveFunction:
@@ -149,7 +137,8 @@ void FileDialog::enter(const fs::path& folder) {
   const Look look = lookOf(*purpose_);
   if (!look.saves) select({});
   try {
-    entries_ = entriesOf(folder, all_files_ ? std::vector<std::string>{} : look.endings, is_grid_folder_);
+    const auto& endings = *purpose_ == Purpose::kOpenData ? data_endings_ : look.endings;
+    entries_ = entriesOf(folder, all_files_ ? std::vector<std::string>{} : endings, is_grid_folder_);
     folder_ = folder;
   } catch (const Error& error) {
     error_ = error.what();
@@ -243,28 +232,17 @@ float FileDialog::heightBelow() const {
 void FileDialog::drawHelp(bool saves) const {
   ImGui::BeginChild("entries", {0, -heightBelow()}, true);
   nameArea("dialog keys", 0, 0, 1, 1);
-  if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_RowBg)) {
-    const auto row = [](const char* key, const char* what) {
-      ImGui::TableNextRow();
-      ImGui::TableNextColumn();
-      ImGui::TextUnformatted(key);
-      ImGui::TableNextColumn();
-      ImGui::TextUnformatted(what);
-    };
-    ImGui::TableSetupColumn("key or mouse");
-    ImGui::TableSetupColumn("what it does");
-    ImGui::TableHeadersRow();
-    row("Return", saves ? "saves under the name" : "opens what is named or chosen; enters a folder");
-    row("Esc", "shows the files again; there, closes the dialog");
-    row("click", "chooses a file");
-    row("double click", saves ? "saves under its name; enters a folder" : "opens a file; enters a folder");
-    if (*purpose_ == Purpose::kOpenData) {
-      row("Ctrl + click", "chooses several: a grid and its solutions");
-      row("Shift + click", "chooses all from the chosen one to this one");
-    }
-    row("F1", "shows the files again");
-    ImGui::EndTable();
+  std::vector<KeyRow> rows{
+      {"Return", saves ? "saves under the name" : "opens what is named or chosen; enters a folder"},
+      {"Esc", "shows the files again; there, closes the dialog"},
+      {"click", "chooses a file"},
+      {"double click", saves ? "saves under its name; enters a folder" : "opens a file; enters a folder"}};
+  if (*purpose_ == Purpose::kOpenData) {
+    rows.push_back({"Ctrl + click", "chooses several: a grid and its solutions"});
+    rows.push_back({"Shift + click", "chooses all from the chosen one to this one"});
   }
+  rows.push_back({"F1", "shows the files again"});
+  drawKeyTable(rows);
   ImGui::EndChild();
 }
 

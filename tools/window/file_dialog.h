@@ -58,9 +58,15 @@ class FileDialog {
     bool has_encoder = true;                                   // ffmpeg, which .mp4 and .gif need
   };
 
-  /// `is_grid_folder` may be empty: no folder is. `data_folder`: where data were opened last; may be empty.
-  FileDialog(IsGridFolder is_grid_folder, std::filesystem::path data_folder)
-      : is_grid_folder_(std::move(is_grid_folder)), data_folder_(std::move(data_folder)) {}
+  /// `is_grid_folder` may be empty: no folder is. `grid_endings`: of grids' files. `data_folder`: where data were opened last;
+  /// may be empty.
+  FileDialog(IsGridFolder is_grid_folder, std::vector<std::string> grid_endings,
+             std::filesystem::path data_folder)
+      : is_grid_folder_(std::move(is_grid_folder)),
+        data_endings_(std::move(grid_endings)),
+        data_folder_(std::move(data_folder)) {
+    data_endings_.emplace_back(".splats");
+  }
 
   /// Opens it with the next draw(), in the folder it was in last. `name`: the one that is offered.
   void open(Purpose purpose, const std::string& name = "");
@@ -88,6 +94,7 @@ class FileDialog {
   void drawRate();
 
   const IsGridFolder is_grid_folder_;
+  std::vector<std::string> data_endings_;  // of kOpenData
   std::optional<Purpose> purpose_;
   bool opens_ = false;
   int frames_to_focus_ = 0;  // at most: what is typed waits until the name has the focus

@@ -1,6 +1,6 @@
-// The messages of the window: messages over the picture, which go away by themselves (Toasts), and Reports,
-// the one place that decides what happens to an error, wherever it comes from: it is shown over the picture
-// and printed, and the window goes on with what it has. Only Interrupted passes, which ends the program.
+// The messages of the window. Toasts are shown over the picture and go away by themselves. Reports is the one place that
+// decides what happens to an error, wherever it comes from: the error is shown over the picture and printed, and the window
+// goes on with what it has. Only Interrupted is not caught: it ends the program.
 //
 // A message stays long enough to be read. An error stays until it is clicked away, until what failed succeeds, or for a minute. Nothing
 // here knows the window. For the window's thread.
@@ -26,7 +26,7 @@ struct Toast {
 /// The messages that are shown, and the last ones, which can be read again. A value type.
 class Toasts {
  public:
-  /// `now_s` is any clock's. The same text again only stays longer: then it returns false.
+  /// Adds a message at the time `now_s` of any clock. A text that is shown already stays longer; then it returns false.
   bool add(const std::string& text, double now_s, bool is_error = false, About about = About::kNothing);
   /// Removes the errors about something that has succeeded.
   void settle(About about);
@@ -44,7 +44,7 @@ class Toasts {
   std::deque<std::string> log_;
 };
 
-/// A message as the window shows it: says where the options are that it names, since the window has none.
+/// The message as the window shows it. Where it names an option, which the window does not have, the command that takes it is added.
 std::string inWindowsWords(const std::string& message);
 
 /// Shows and prints errors and messages.
@@ -54,7 +54,7 @@ class Reports {
   Reports(Toasts& toasts, double (*clock_s)()) : toasts_(toasts), clock_s_(clock_s) {}
 
   void say(const std::string& text) { toasts_.add(text, clock_s_()); }
-  /// Does `act`. Returns false if it threw an error, which is reported as one about this.
+  /// Calls `act`. Returns false if it threw an error, which is reported as one about `about`.
   bool attempt(const std::function<void()>& act, About about = About::kNothing);
   /// Shows and prints the error, but not again while it is shown.
   void report(const std::exception& error, About about = About::kNothing);

@@ -242,6 +242,19 @@ void nameWithoutTab(const std::string& name) {
     nameArea(fmt::format("twins: {} and {}", other, name), 0, 0, 0, 0);
 }
 
+void drawKeyTable(std::span<const KeyRow> rows) {
+  if (!ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_RowBg)) return;
+  ImGui::TableSetupColumn("key or mouse");
+  ImGui::TableSetupColumn("what it does");
+  ImGui::TableHeadersRow();
+  for (const KeyRow& row : rows)
+    for (const char* const text : {row.key, row.what}) {
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(text);
+    }
+  ImGui::EndTable();
+}
+
 void nameArea(const std::string& name, double x, double y, double width, double height) {
   if (places().file)
     places().now += fmt::format("{:.0f} {:.0f} {:.0f} {:.0f} {}\n", x, y, width, height, name);

@@ -41,6 +41,13 @@ class TypedNumbers {
 /// changed. `label` is Dear ImGui's.
 bool colourSwatch(const char* label, float* rgb, const std::string& name);
 
+/// A row of a table of keys: a key, and what it does.
+struct KeyRow {
+  const char *key, *what;
+};
+/// Draws a table of keys, with its heading.
+void drawKeyTable(std::span<const KeyRow> rows);
+
 /// Whether the widget that was drawn last is held, and not a field into which a number is typed.
 bool isDragged();
 

@@ -9,6 +9,7 @@
 #include <array>
 #include <filesystem>
 #include <string_view>
+#include <vector>
 
 #include "stream/base/error.h"
 #include "tools/window/widgets.h"
@@ -311,7 +312,7 @@ void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& 
 
 void drawKeys(bool& open, Window& window) {
   if (!open) return;
-  constexpr std::array<std::pair<const char*, const char*>, 12> kMouse{{
+  std::vector<KeyRow> rows{
       {"left drag", "rotate; while flying, look around"},
       {"wheel", "zoom to what is under the mouse"},
       {"right drag", "zoom"},
@@ -324,24 +325,11 @@ void drawKeys(bool& open, Window& window) {
       {"drop files", "open them"},
       {"Tab, Shift + Tab", "go to the next button, field or slider, and back"},
       {"Space, Return", "press it; Esc leaves it"},
-  }};
+  };
   if (beginWindow("Keys and mouse", open, window)) {
-    const auto row = [](const char* key, const char* what) {
-      ImGui::TableNextRow();
-      ImGui::TableNextColumn();
-      ImGui::TextUnformatted(key);
-      ImGui::TableNextColumn();
-      ImGui::TextUnformatted(what);
-    };
-    if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_RowBg)) {
-      ImGui::TableSetupColumn("key or mouse");
-      ImGui::TableSetupColumn("what it does");
-      ImGui::TableHeadersRow();
-      for (const auto& [key, what] : kMouse) row(key, what);
-      for (const CommandInfo& info : commands())
-        if (*info.key_name) row(info.key_name, info.label);
-      ImGui::EndTable();
-    }
+    for (const CommandInfo& info : commands())
+      if (*info.key_name) rows.push_back({info.key_name, info.label});
+    drawKeyTable(rows);
   }
   ImGui::End();
 }

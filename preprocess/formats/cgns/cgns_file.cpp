@@ -3,15 +3,12 @@
 #include <cgns_io.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 #include <limits>
-#include <optional>
-#include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 
+#include "preprocess/formats/cgns/adf_header.h"
 #include "preprocess/formats/cgns/cgns_hdf5.h"
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
@@ -41,7 +38,6 @@ CURVISPLAT_LIBRARY_FUNCTION(cgio_release_id)
 
 namespace {
 
-constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 // Names and labels have at most 32 characters, but libcgns copies whatever length a damaged file has.
 constexpr size_t kTextBytes = 4096;
 // Elements that are read from an ADF file at a time; their types are converted here.
@@ -94,62 +90,8 @@ void convert(std::string_view type, const std::byte* from, uint64_t count, Value
   convert<int64_t>(from, count, to);
 }
 
-/// The first 32 bytes; zeros if the file is shorter.
-std::string beginOf(const InputFile& file) {
-  std::string begin(32, '\0');
-  if (file.size() >= begin.size()) file.readAt(0, std::span(begin.data(), begin.size()));
-  return begin;
-}
-
 bool isHdf5(const InputFile& file) {
-  return beginOf(file).starts_with(kHdf5Mark);
-}
-
-/// A number of digits in base 16; nullopt if it is none.
-std::optional<uint64_t> hexadecimal(std::string_view digits) {
-  uint64_t number = 0;
-  const char* const end = digits.data() + digits.size();
-  const auto [stop, error] = std::from_chars(digits.data(), end, number, 16);
-  if (stop != end || error != std::errc()) return std::nullopt;
-  return number;
-}
-
-/// An unsigned number in binary form, of either byte order.
-std::optional<uint64_t> binary(std::string_view bytes, bool big_endian) {
-  uint64_t number = 0;
-  for (size_t n = 0; n < bytes.size(); ++n)
-    number = number << 8 | static_cast<uint8_t>(bytes[big_endian ? n : bytes.size() - 1 - n]);
-  return number;
-}
-
-/// The position of an ADF file's last byte; nullopt if its header has none. It is in the header's bytes 146 to
-/// 157: a block of 4,096 bytes in eight bytes, and the byte in it in four. Version A has hexadecimal digits there,
-/// version B numbers in the byte order that byte 100 names.
-std::optional<uint64_t> lastByteOfAdf(std::string_view header) {
-  constexpr size_t kVersion = 25, kOrder = 100, kEnd = 146, kOfBlock = 8, kOfByte = 4;
-  constexpr uint64_t kBlock = 4096;
-  const std::string_view in_block = header.substr(kEnd, kOfBlock),
-                         in_byte = header.substr(kEnd + kOfBlock, kOfByte);
-  const bool digits = header[kVersion] != 'B', big_endian = header[kOrder] == 'B';
-  const auto block = digits ? hexadecimal(in_block) : binary(in_block, big_endian);
-  const auto byte = digits ? hexadecimal(in_byte) : binary(in_byte, big_endian);
-  if (!block || !byte || *block >= std::numeric_limits<uint64_t>::max() / kBlock / 2) return std::nullopt;
-  return kBlock * *block + *byte;
-}
-
-/// Throws Error if an ADF file is shorter than its header says: libcgns reads text without an end from
-/// blocks that are not there.
-void requireAllOfAdf(const InputFile& file) {
-  constexpr size_t kHeader = 186;
-  std::string header(kHeader, '\0');
-  if (file.size() >= kHeader) file.readAt(0, std::span(header.data(), header.size()));
-  const auto last = lastByteOfAdf(header);
-  if (!last || *last < kHeader)
-    throw Error("{}: its ADF header has no position of its end; the file is damaged: copy or write it again",
-                file.path().string());
-  if (*last >= file.size())
-    throw Error("{}: is truncated (found {} bytes, expected {}); copy or write it again",
-                file.path().string(), file.size(), *last + 1);
+  return beginningOf(file, kHdf5Signature.size()) == kHdf5Signature;
 }
 
 struct Selection {
@@ -209,7 +151,7 @@ CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)) {
     hdf5_ = std::make_unique<CgnsHdf5>(path_);
     return;
   }
-  requireAllOfAdf(file);
+  requireWholeAdf(file);
   const MutexLock lock(dataLibraryMutex());
   if (cgio_open_file(path_.c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &file_) != CGIO_ERR_NONE) fail("");
   if (cgio_get_root_id(file_, &root_) != CGIO_ERR_NONE) {
@@ -228,7 +170,7 @@ CgnsFile::~CgnsFile() {
 bool CgnsFile::recognises(const InputFile& file) {
   if (isHdf5(file)) return file.path().extension() == ".cgns" || CgnsHdf5::recognises(file.path());
   // The first four bytes of an ADF file differ between versions.
-  return beginOf(file).substr(4).starts_with("ADF Database Version");
+  return beginningOf(file, 32).find("ADF Database Version") == 4;
 }
 
 void CgnsFile::fail(const std::string& node_path) const {
@@ -415,57 +357,6 @@ void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox&
 
 void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, float* to) const {
   hdf5_ ? hdf5_->read(node, box, to) : readAdf(node, shape, box, to);
-}
-
-namespace {
-
-constexpr int kMaxDepth = 16;
-constexpr size_t kMaxNodes = 20'000;
-constexpr uint64_t kSmall = 4096;  // values that are read as a whole
-
-/// The first and the last value, or all.
-void readValues(const CgnsFile& file, const CgnsNode& node, const CgnsShape& shape) {
-  if (shape.type == "C1") {
-    file.texts(node);
-  } else if (shape.number() && shape.count() <= kSmall) {
-    file.numbers(node);
-  } else if (shape.number()) {
-    CgnsBox box{{}, {1, 1, 1}, {1, 1}};
-    double value = 0;
-    for (const bool last : {false, true}) {
-      for (size_t axis = 0; last && axis < std::min<size_t>(3, shape.dims.size()); ++axis)
-        box.first[axis] = shape.dims[axis] - 1;
-      file.read(node, shape, box, &value);
-    }
-  }
-}
-
-/// Errors end the visit of a node, not of those beside it.
-void visit(const CgnsFile& file, const CgnsNode& node, int depth, size_t& visited) {
-  if (depth > kMaxDepth || ++visited > kMaxNodes) return;
-  try {
-    if (depth > 0) readValues(file, node, file.shape(node));
-  } catch (const Error&) {
-    // The reader finds the same, if it needs the node.
-  }
-  try {
-    for (const CgnsNode& child : file.children(node)) visit(file, child, depth + 1, visited);
-  } catch (const Error&) {
-  }
-}
-
-}  // namespace
-
-void tryAdf(const std::filesystem::path& path) {
-  std::string begin(32, '\0');
-  if (const InputFile file(path); file.size() >= begin.size())
-    file.readAt(0, std::span(begin.data(), begin.size()));
-  if (!std::string_view(begin).substr(4).starts_with("ADF")) return;
-  tryLibrary("libcgns", path, [&] {
-    const CgnsFile file(path);
-    size_t visited = 0;
-    visit(file, file.root(), 0, visited);
-  });
 }
 
 }  // namespace curvisplat

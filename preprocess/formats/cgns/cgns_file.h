@@ -6,7 +6,7 @@
 // when a file is opened, rejects files because of boundary conditions that nobody asked for, and trusts the
 // sizes in a damaged file. CgnsFile reads only the nodes that are requested, and checks every size before it
 // allocates: dimensions against the size of the file, types against the destination. Since libcgns also
-// trusts the structures of ADF files, tryAdf() lets it visit them in a child process first.
+// trusts the structures of ADF files, tryAdf() (adf_trial.h) lets it visit them in a child process first.
 //
 // Neither library is thread-safe: every call holds dataLibraryMutex(). Any number of threads may use a
 // CgnsFile; their calls run one after the other. Links to other files are followed.
@@ -72,10 +72,5 @@ class CgnsFile {
   int file_ = 0;                    // libcgns' id of an ADF file
   double root_ = 0;                 // libcgns' id of its root node
 };
-
-/// Visits the nodes of an ADF file, 20,000 at most, with their first and last values, in a child process
-/// (library_trial.h), and throws Error if libcgns crashes there: in a damaged file, it reads memory that
-/// does not exist. Files of other formats are left alone. Must not be called with dataLibraryMutex() held.
-void tryAdf(const std::filesystem::path& path);
 
 }  // namespace curvisplat

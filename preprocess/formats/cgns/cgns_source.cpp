@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/cgns/adf_trial.h"
 #include "preprocess/formats/cgns/cgns_cells.h"
 #include "preprocess/formats/cgns/cgns_file.h"
 #include "preprocess/formats/cgns/cgns_tree.h"

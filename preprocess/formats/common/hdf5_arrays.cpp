@@ -26,14 +26,9 @@ std::vector<uint64_t> extentOf(const Hdf5Space& space) {
   return {extent.begin(), extent.begin() + rank};
 }
 
-bool isVirtual(hid_t set) {
-  const Hdf5Handle<H5Pclose> properties(H5Dget_create_plist(set));
-  return properties && H5Pget_layout(properties.id()) == H5D_VIRTUAL;
-}
-
 /// The first filter of a data set that HDF5 does not have on this machine; empty if it has all.
 std::string missingFilter(hid_t set) {
-  const Hdf5Handle<H5Pclose> properties(H5Dget_create_plist(set));
+  const Hdf5Properties properties(H5Dget_create_plist(set));
   const int count = properties ? H5Pget_nfilters(properties.id()) : 0;
   for (int n = 0; n < count; ++n) {
     std::array<char, 64> name{};
@@ -75,6 +70,7 @@ void Hdf5Sets::with(const std::filesystem::path& path, const std::string& name,
     if (!file) throw Error("{}: {}: is not an HDF5 file, or is damaged", path.string(), name);
     Hdf5DataSet set(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT));
     if (!set) throw Error("{}: {}: has no such data set", path.string(), name);
+    watched_.try_emplace(path, std::vector<std::string>{path.string()});
     if (open_.size() == kMaxOpen) open_.pop_back();
     open_.push_front({path, name, std::move(file), std::move(set)});
   }
@@ -95,9 +91,9 @@ Hdf5Array::Hdf5Array(std::shared_ptr<Hdf5Sets> sets, std::filesystem::path path,
     for (const uint64_t n : dims_)
       size_ = n > 0 && size_ > kMaxArrayValues / n ? kMaxArrayValues + 1 : size_ * n;
     if (dims_.empty()) fail("has no dimensions; expected an array");
-    watched_ = WatchedFiles({path_.string()});
     if (size_ > kMaxArrayValues) fail("has impossible dimensions; the file is damaged");
-    stored_bytes_ = isVirtual(set) ? std::numeric_limits<uint64_t>::max() : H5Dget_storage_size(set);
+    stored_bytes_ = isVirtual(Hdf5Properties(H5Dget_create_plist(set))) ? std::numeric_limits<uint64_t>::max()
+                                                                        : H5Dget_storage_size(set);
   });
 }
 
@@ -160,8 +156,8 @@ void Hdf5Array::readParts(As as, const std::function<void(const ReadPart&)>& use
                           filter));
         fail("cannot be read (HDF5: " + reason + "); the file is damaged");
       }
-      watched_.requireWhole();
     });
+    sets_->requireWhole(path_);
   });
 }
 

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <functional>
 #include <list>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -32,6 +33,9 @@ class Hdf5Sets {
   /// Calls use(identifier) with the mutex held; opens the data set unless it is open. Throws Error.
   void with(const std::filesystem::path& path, const std::string& name,
             const std::function<void(hid_t)>& use);
+  /// Throws Error if a file of with(), or one that its links lead to, has become shorter since it was first opened. With
+  /// the mutex held.
+  void requireWhole(const std::filesystem::path& path) const { watched_.at(path).requireWhole(); }
 
  private:
   struct Open {
@@ -43,6 +47,7 @@ class Hdf5Sets {
   bool moveToFront(const std::filesystem::path& path, const std::string& name);
 
   std::list<Open> open_;
+  std::map<std::filesystem::path, WatchedFiles> watched_;
 };
 
 /// The start of a part of an array, its step and its count along each dimension.
@@ -91,7 +96,6 @@ class Hdf5Array {
 
   std::shared_ptr<Hdf5Sets> sets_;
   std::filesystem::path path_;
-  WatchedFiles watched_;  // with those that links lead to
   std::string name_;
   std::vector<uint64_t> dims_;
   uint64_t size_ = 1;

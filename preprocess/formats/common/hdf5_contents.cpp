@@ -23,13 +23,10 @@ constexpr double kMaxCount = 1e14;
 // No filter packs numbers more tightly than this, but the emptiest of arrays.
 constexpr uint64_t kMaxPacking = 65536, kSmall = uint64_t{1} << 20;
 
-using Hdf5Object = Hdf5Handle<H5Oclose>;
-
 }  // namespace
 
 std::set<std::string> rootLinksOf(const InputFile& file, std::initializer_list<const char*> names) {
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  if (beginningOf(file, kSignature.size()) != kSignature) return {};
+  if (beginningOf(file, kHdf5Signature.size()) != kHdf5Signature) return {};
   requireWholeHdf5(file);
   tryHdf5(file.path());
   const QuietHdf5 quiet;

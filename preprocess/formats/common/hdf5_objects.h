@@ -48,6 +48,8 @@ using Hdf5DataSet = Hdf5Handle<H5Dclose>;
 using Hdf5Attribute = Hdf5Handle<H5Aclose>;
 using Hdf5Type = Hdf5Handle<H5Tclose>;
 using Hdf5Space = Hdf5Handle<H5Sclose>;
+using Hdf5Object = Hdf5Handle<H5Oclose>;
+using Hdf5Properties = Hdf5Handle<H5Pclose>;
 
 /// Holds dataLibraryMutex(), and stops HDF5 from printing its error stack: failures are thrown as Error.
 /// HDF5 keeps this setting for each thread, so every thread that calls HDF5 or libnetcdf needs it. It stays
@@ -82,6 +84,11 @@ struct Hdf5AttributeShape {
   /// "11 strings of 3 bytes", for error messages.
   std::string describe() const;
 };
+
+/// Whether a data set with these properties takes its values from others.
+inline bool isVirtual(const Hdf5Properties& properties) {
+  return properties && H5Pget_layout(properties.id()) == H5D_VIRTUAL;
+}
 
 /// "integers", "strings", ...: the values of a type, for error messages.
 const char* describe(H5T_class_t kind);

@@ -12,7 +12,6 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -22,6 +21,7 @@
 
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/data_libraries.h"
+#include "preprocess/formats/common/hdf5_exits.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "stream/base/error.h"
 #include "stream/base/os.h"
@@ -39,8 +39,7 @@ constexpr size_t kLooked = 64;
 
 /// nullopt if `begin` is not that of an HDF5 file, or of a version that is not known.
 std::optional<uint64_t> statedEnd(const std::array<uint8_t, kLooked>& begin) {
-  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  if (!std::equal(kSignature.begin(), kSignature.end(), begin.begin(),
+  if (!std::equal(kHdf5Signature.begin(), kHdf5Signature.end(), begin.begin(),
                   [](char a, uint8_t b) { return static_cast<uint8_t>(a) == b; }))
     return std::nullopt;
   const uint8_t version = begin[8];
@@ -72,10 +71,7 @@ constexpr rlim_t kSeconds = 10, kBytesPerSecond = rlim_t{64} << 20, kBytes = rli
 constexpr size_t kMaxAttributeBytes = size_t{1} << 20, kMaxChunkBytes = size_t{1} << 18;
 constexpr size_t kMaxReadBytes = size_t{1} << 26;  // of all chunks
 
-using Hdf5Object = Hdf5Handle<H5Oclose>;
-using Hdf5Properties = Hdf5Handle<H5Pclose>;
-
-/// in_trial: this is the process of a trial. leads_out: its walk met something that Hdf5Exits has to look at.
+/// in_trial: this is the process of a trial. leads_out: its walk met something that exitsOf() has to look at.
 bool in_trial = false, leads_out = false;
 constexpr int kExitLeadsOut = 3;
 
@@ -111,10 +107,6 @@ size_t readableBytes(const Hdf5Properties& properties, const Hdf5Space& space, c
     points = length > 0 && points <= static_cast<hssize_t>(kMaxChunkBytes) / length ? points * length : 0;
   }
   return bytesOf(points, type, kMaxChunkBytes);
-}
-
-bool isVirtual(const Hdf5Properties& properties) {
-  return properties && H5Pget_layout(properties.id()) == H5D_VIRTUAL;
 }
 
 /// Reads a data set's index, and its first and last value.
@@ -176,159 +168,6 @@ void walk(const std::filesystem::path& path) {
   const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   size_t read = 0;
   leads_out |= file && H5Ovisit2(file.id(), H5_INDEX_NAME, H5_ITER_NATIVE, visit, &read, H5O_INFO_ALL) < 0;
-}
-
-/// Finds what leads out of an HDF5 file, without following it.
-class Hdf5Exits {
- public:
-  struct VirtualSource {
-    std::filesystem::path file;
-    std::string set;
-  };
-
-  /// Finds nothing if HDF5 cannot open the file. Throws Error if it leads where it may not.
-  explicit Hdf5Exits(const std::filesystem::path& path) : path_(path) {
-    const QuietHdf5 quiet;
-    const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-    auto root = std::make_shared<const Hdf5Object>(file ? H5Oopen(file.id(), "/", H5P_DEFAULT) : -1);
-    if (!*root) return;
-    std::vector<HardLink> found{{std::move(root), "."}};
-    while (!found.empty()) {
-      const HardLink next = std::move(found.back());
-      found.pop_back();
-      const auto object =
-          std::make_shared<const Hdf5Object>(H5Oopen(next.group->id(), next.name.c_str(), H5P_DEFAULT));
-      H5O_info_t info;
-      // What cannot be opened here cannot be opened by a reader.
-      if (!*object || H5Oget_info2(object->id(), &info, H5O_INFO_BASIC) < 0) continue;
-      if (info.rc > 1 && !several_names_.insert(info.addr).second) continue;
-      if (info.type == H5O_TYPE_DATASET) lookAt(*object);
-      if (info.type != H5O_TYPE_GROUP) continue;
-      for (std::string& name : linksOf(*object)) found.push_back({object, std::move(name)});
-    }
-  }
-
-  /// The files that exist.
-  const std::set<std::filesystem::path>& files() const { return files_; }
-  const std::vector<VirtualSource>& sources() const { return sources_; }
-
- private:
-  struct HardLink {
-    std::shared_ptr<const Hdf5Object> group;
-    std::string name;
-  };
-  struct Link {
-    std::string name;
-    H5L_type_t type;
-    size_t bytes;
-  };
-
-  [[noreturn]] void fail(const Hdf5Object& object, std::string_view what) const {
-    std::array<char, 1024> name{};
-    H5Iget_name(object.id(), name.data(), name.size());
-    throw Error("{}: {}: {}", path_.string(), name.data(), what);
-  }
-
-  /// Looks at the external links of a group, and returns the names of the hard ones. Soft links stay in the
-  /// file.
-  std::vector<std::string> linksOf(const Hdf5Object& group) {
-    std::vector<Link> links;
-    const auto add = [](hid_t, const char* name, const H5L_info_t* info, void* to) -> herr_t {
-      try {
-        const bool has_value = info->type != H5L_TYPE_HARD;
-        static_cast<std::vector<Link>*>(to)->push_back({name, info->type, has_value ? info->u.val_size : 0});
-        return 0;
-      } catch (const std::exception&) {
-        return -1;
-      }
-    };
-    if (H5Literate(group.id(), H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, add, &links) < 0)
-      fail(group, "its list of objects cannot be read (HDF5: " + hdf5Reason() +
-                      "); the file is damaged: copy or write it again");
-    std::vector<std::string> names;
-    for (Link& link : links) {
-      if (link.type == H5L_TYPE_HARD) names.push_back(std::move(link.name));
-      if (link.type != H5L_TYPE_EXTERNAL) continue;
-      std::vector<char> value(link.bytes);
-      const char *file = nullptr, *object = nullptr;
-      if (H5Lget_val(group.id(), link.name.c_str(), value.data(), value.size(), H5P_DEFAULT) < 0 ||
-          H5Lunpack_elink_val(value.data(), value.size(), nullptr, &file, &object) < 0)
-        fail(group,
-             "its link '" + link.name + "' cannot be read; the file is damaged: copy or write it again");
-      follow(group, file);
-    }
-    return names;
-  }
-
-  void lookAt(const Hdf5Object& set) {
-    const Hdf5Properties properties(H5Dget_create_plist(set.id()));
-    if (!properties) return;
-    if (H5Pget_external_count(properties.id()) > 0)
-      fail(set, "its values are in another file, without a description; store them in this one");
-    size_t count = 0;
-    if (!isVirtual(properties)) return;
-    if (H5Pget_virtual_count(properties.id(), &count) < 0) fail(set, "its sources cannot be read");
-    for (size_t n = 0; n < count; ++n) {
-      const std::string file = textOf(H5Pget_virtual_filename, properties, n),
-                        source = textOf(H5Pget_virtual_dsetname, properties, n);
-      if (file.find('%') != std::string::npos || source.find('%') != std::string::npos)
-        fail(set,
-             "its sources are named by the pattern '" + file + "', which is not followed; name each of them");
-      if (file == ".")
-        sources_.push_back({path_, source});
-      else if (const auto found = follow(set, file))
-        sources_.push_back({*found, source});
-    }
-  }
-
-  template <typename Get>
-  static std::string textOf(const Get& get, const Hdf5Properties& properties, size_t n) {
-    const ssize_t size = get(properties.id(), n, nullptr, 0);
-    std::string text(static_cast<size_t>(std::max<ssize_t>(0, size)) + 1, '\0');
-    get(properties.id(), n, text.data(), text.size());
-    text.pop_back();
-    return text;
-  }
-
-  /// The file that HDF5 finds by this name, if there is one: beside this file, in the working directory or at
-  /// the end of symbolic links. It looks for absolute names of missing files in these places, too.
-  std::optional<std::filesystem::path> follow(const Hdf5Object& from, const std::filesystem::path& named) {
-    const std::filesystem::path folder = folderOf(path_);
-    std::error_code missing;
-    std::filesystem::path name = named;
-    if (named.is_absolute() && !std::filesystem::exists(named, missing)) name = named.filename();
-    for (const auto& place : {folder, std::filesystem::path(), folderOf(linkTarget(path_))}) {
-      const std::filesystem::path file = place / name;
-      if (!std::filesystem::exists(file, missing)) continue;
-      if (leadsOut(folder, name))
-        fail(from,
-             "leads to " + name.string() + ", which lies outside the folder of the file; put both into one");
-      if (!isRegularFile(file)) fail(from, "leads to " + file.string() + ", which is not a regular file");
-      files_.insert(file);
-      return file;
-    }
-    return std::nullopt;
-  }
-
-  const std::filesystem::path path_;
-  std::set<haddr_t> several_names_;  // objects that were met, of those that have more than one
-  std::set<std::filesystem::path> files_;
-  std::vector<VirtualSource> sources_;
-};
-
-/// Throws Error if a source is virtual itself. All files have been looked at: HDF5 may follow their links.
-void requireStored(const std::filesystem::path& path, const std::vector<Hdf5Exits::VirtualSource>& sources) {
-  const QuietHdf5 quiet;
-  for (const auto& source : sources) {
-    const Hdf5File file(H5Fopen(source.file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-    const Hdf5Object set(file ? H5Oopen(file.id(), source.set.c_str(), H5P_DEFAULT) : -1);
-    const Hdf5Properties properties(set ? H5Dget_create_plist(set.id()) : -1);
-    if (properties && isVirtual(properties))
-      throw Error(
-          "{}: takes virtual data from {} in {}, which is a virtual data set itself; store its values in the "
-          "file",
-          path.string(), source.set, source.file.string());
-  }
 }
 
 constexpr std::array kStops{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
@@ -462,10 +301,10 @@ void walkAll(const std::filesystem::path& path, TriedFiles& walked) {
     const Trial trial = tryWork("HDF5", file, before, [&] { walk(file); });
     if (trial != Trial::kNone) tried.push_back(before);
     if (trial == Trial::kPassed) continue;
-    const Hdf5Exits exits(file);
-    noteLinks(file, exits.files());
-    sources.insert(sources.end(), exits.sources().begin(), exits.sources().end());
-    for (const auto& next : exits.files())
+    const Hdf5Exits exits = exitsOf(file);
+    noteLinks(file, exits.files);
+    sources.insert(sources.end(), exits.sources.begin(), exits.sources.end());
+    for (const auto& next : exits.files)
       if (known.insert(next).second) files.push_back(next);
     if (files.size() > kMaxFiles) throw Error("{}: leads to more than {} files", path.string(), kMaxFiles);
   }

@@ -10,10 +10,13 @@
 
 #include <filesystem>
 #include <functional>
+#include <string_view>
 
 #include "stream/base/file.h"
 
 namespace curvisplat {
+
+inline constexpr std::string_view kHdf5Signature = "\x89HDF\r\n\x1a\n";
 
 /// Throws TruncatedFile if `file` begins as HDF5 and ends before the address that its superblock (versions 0
 /// to 3) states: HDF5 reports a truncated file as an unknown error.

@@ -49,11 +49,11 @@ struct OpenGridOptions {
   GlobeOptions globe = {};                       // for grids in degrees
   std::vector<std::string> scalars = {};         // requested; select one of several grids in a file
   std::optional<bool> cut_curved = {};    // cells of higher order (default); false: drawn by their corners
-  std::vector<std::string> select = {};   // "month=3": of a dimension of NetCDF, the one value to read
+  std::vector<std::string> select = {};   // "month=3": the value to read of a NetCDF dimension
   std::shared_ptr<FileIndex> index = {};  // of files whose steps are opened one after the other; may be null
   std::optional<std::filesystem::path> names_folder = {};  // of the files that `grid` names; nullopt: its own
 
-  bool is_part = false;  // `grid` is one of several files of a grid that are opened each by itself
+  bool is_part = false;  // `grid` is one of a grid's files, each of which is opened by itself
 
   /// The folder that names in `grid` are relative to.
   std::filesystem::path namesFolder() const { return names_folder.value_or(grid.parent_path()); }

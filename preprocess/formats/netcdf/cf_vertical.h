@@ -31,7 +31,7 @@ class CfVertical {
   /// terms have the names that models give them. Then, of lengths first and of pressures after that: the
   /// value of every node; WRF's sums of two fields (PH and PHB, or pressures); of lengths alone, the layers'
   /// interfaces; the value of every level. At last the thickness of the layers; heights and pressures of
-  /// nodes by name (met_em's GHT); and lengths of levels that nothing calls heights.
+  /// nodes by name (met_em's GHT); and lengths of levels whose name and attributes do not say that they are heights.
   static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFiles& file,
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& given, size_t axis);

@@ -44,7 +44,7 @@ size_t NetcdfBox::values() const {
 
 bool NetcdfFile::recognises(const InputFile& file) {
   const std::string mark = beginningOf(file, 8);
-  return mark.size() == 8 && (isClassic(mark) || mark == "\x89HDF\r\n\x1a\n");
+  return mark.size() == 8 && (isClassic(mark) || mark == kHdf5Signature);
 }
 
 NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {

@@ -204,8 +204,6 @@ constexpr size_t kMaxNameBytes = 4096;
 constexpr uint64_t kMinObjectBytes = 32;
 constexpr uint64_t kSmallFileObjects = 4096;
 
-using Hdf5Object = Hdf5Handle<H5Oclose>;
-
 class Walk {
  public:
   Walk(const std::filesystem::path& path, const Hdf5File& file) : path_(path) {

@@ -14,6 +14,8 @@
 #include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_library.h"
 #include "preprocess/formats/common/hdf5_objects.h"
+#include "preprocess/formats/common/library_trial.h"
+#include "preprocess/formats/open/grid_endings.h"
 #include "preprocess/formats/openfoam/foam_source.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
@@ -42,7 +44,7 @@ constexpr const char* kUtf16 = "text in UTF-16, which is not read (iconv -f UTF-
 constexpr Magic kMagics[] = {
     {"# vtk DataFile"sv, "a legacy VTK file"},
     {"<VTKFile"sv, "a VTK XML file"},
-    {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file"},
+    {kHdf5Signature, "an HDF5 file"},
     {"CDF\x01"sv, "a NetCDF file"},
     {"CDF\x02"sv, "a NetCDF file"},
     {"CDF\x05"sv, "a NetCDF file"},
@@ -368,7 +370,7 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
            "it)";
   // HDF5 may begin behind 512, 1024, ... bytes of a program's own.
   for (size_t block = 512; block + 8 <= begin.size(); block *= 2)
-    if (begin.substr(block, 8) == "\x89HDF\r\n\x1a\n"sv)
+    if (begin.substr(block, 8) == kHdf5Signature)
       return fmt::format(
           "an HDF5 file behind {} bytes of a program's own, by no convention that is read (an XDMF file "
           "describes its "
@@ -425,23 +427,6 @@ std::optional<std::string> foreignHdf5(const std::filesystem::path& path) {
   return std::nullopt;
 }
 
-namespace {
-
-/// The format that the ending of a name promises, of formats whose files begin with a mark; null for others.
-const char* formatOfEnding(const std::filesystem::path& path) {
-  constexpr std::pair<std::string_view, const char*> kEndings[] = {
-      {".vtk", "a legacy VTK file"}, {".vti", "a VTK XML file"},   {".vtr", "a VTK XML file"},
-      {".vts", "a VTK XML file"},    {".vtu", "a VTK XML file"},   {".vtm", "a VTK XML file"},
-      {".vtp", "a VTK XML file"},    {".pvd", "a VTK XML file"},   {".nc", "a NetCDF file"},
-      {".cgns", "a CGNS file"},      {".case", "an EnSight case"}, {".xdmf", "an XDMF file"},
-      {".xmf", "an XDMF file"}};
-  const std::string ending = lowerCase(path.extension().string());
-  const auto found = std::ranges::find(kEndings, ending, &std::pair<std::string_view, const char*>::first);
-  return found == std::end(kEndings) ? nullptr : found->second;
-}
-
-}  // namespace
-
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   if (isRegularFile(path / "manifest.json") && isRegularFile(path / "bricks.bin"))
     throw Error(
@@ -455,11 +440,12 @@ void refuseForeign(const std::filesystem::path& path, const char* expected) {
     throw Error("{}: is a directory; expected {}", path.string(), expected);
   if (const auto format = foreignFormat(InputFile(path)))
     throw Error("{}: is {}; expected {}", path.string(), *format, expected);
-  if (const char* const format = formatOfEnding(path))
-    throw Error(
-        "{}: does not begin as {} does; write or copy it again, or change its ending if it has another "
-        "format",
-        path.string(), format);
+  for (const auto& [format, endings] : kGridEndings)
+    if (format && std::ranges::count(wordsOf(endings), extensionOf(path)) > 0)
+      throw Error(
+          "{}: does not begin as {} does; write or copy it again, or change its ending if it has another "
+          "format",
+          path.string(), format);
 }
 
 }  // namespace curvisplat

@@ -16,7 +16,7 @@ struct VtkCurves {
   std::vector<float> values;        // [points], or none
 };
 
-/// Whether it is a file of these by its extension.
+/// Whether the file's extension is one of these formats'.
 bool isVtkCurveFile(const std::filesystem::path& path);
 
 /// Polylines, or with `as_points` every point as a line of one. `scalar`: an array of the points or the cells, NAME, NAME:x,

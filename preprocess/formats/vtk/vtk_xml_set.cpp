@@ -76,13 +76,8 @@ class Gatherer {
 
  private:
   VtkMesh finishMesh() {
-    if (!left_out_.empty())
-      grid_.warnings.push_back(fmt::format("{} without unstructured grids {} left out: {}",
-                                           countText(left_out_files_, "file"), isOrAre(left_out_files_),
-                                           left_out_));
-    mesh_.format =
-        fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == mesh_type_ ? "" : " of " + mesh_type_,
-                    mesh_encoding_, countText(mesh_.pieces.size(), "piece"));
+    warnOfLeftOut("unstructured");
+    mesh_.format = describe(mesh_type_, mesh_encoding_, countText(mesh_.pieces.size(), "piece"));
     mesh_.files = std::move(grid_.files);
     mesh_.times = std::move(grid_.times);
     mesh_.time_step = grid_.time_step;
@@ -93,14 +88,22 @@ class Gatherer {
   VtkGrid finishGrid() {
     for (const MeshPiece& piece : mesh_.names)
       if (left_out_files_++ == 0) left_out_ = fmt::format("{} is of type {}", piece.file, mesh_type_);
-    if (!left_out_.empty())
-      grid_.warnings.push_back(fmt::format("{} without structured grids {} left out: {}",
-                                           countText(left_out_files_, "file"), isOrAre(left_out_files_),
-                                           left_out_));
-    grid_.format =
-        fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == leaf_type_ ? "" : " of " + leaf_type_,
-                    encoding_, countText(grid_.blocks.size(), "block"));
+    warnOfLeftOut("structured");
+    grid_.format = describe(leaf_type_, encoding_, countText(grid_.blocks.size(), "block"));
     return std::move(grid_);
+  }
+
+  /// `kind`: of the grids that are read.
+  void warnOfLeftOut(const char* kind) {
+    if (!left_out_.empty())
+      grid_.warnings.push_back(fmt::format("{} without {} grids {} left out: {}",
+                                           countText(left_out_files_, "file"), kind, isOrAre(left_out_files_),
+                                           left_out_));
+  }
+
+  std::string describe(const std::string& type, const std::string& encoding, const std::string& parts) const {
+    return fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == type ? "" : " of " + type, encoding,
+                       parts);
   }
 
   void add(const fs::path& path, const std::string& name) {
