@@ -302,6 +302,13 @@ class Messages(FormatCase):
             result = self.run_program("convert", steps, "-o", self.folder / "a.splats", "--overwrite", *options)
             self.assertEqual(note in result.stderr, said, result.stderr)
 
+    def test_a_missing_cache_is_taken_for_one_of_a_like_name(self):
+        """Folders and endings are alike in all of them."""
+        self.run_program("convert", self.case("flow"), "-o", self.folder / "flow.splats")
+        for name, meant in (("flwo.splats", True), ("crab.splats", False), ("mug.splats", False)):
+            text = self.expect_error(["render", self.folder / name, "-o", self.folder / "a.png"], "does not exist")
+            self.assertEqual("did you mean" in text, meant, text)
+
     def test_empty_files_are_of_no_format(self):
         for name in ("a.vtk", "a.xyz", "a"):
             self.assertNotIn("PLOT3D", self.expect_error(["info", self.write(name, "")], f"{name}: is empty; expected a grid file"))
