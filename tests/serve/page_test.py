@@ -342,7 +342,7 @@ def editing(tab):
     expect(all(abs(a - b) < 1e-5 for a, b in zip(tab.run("range()"), expected)), f"percentiles: {tab.run('range()')}, {expected}")
     changes(tab, lambda: set_value(tab, "#high", "0.8"), "another range")
     changes(tab, lambda: set_value(tab, "#unit", "0.5"), "another opacity unit")
-    for name, opacities in (("ramp", [0, 1]), ("clear", [0, 0]), ("band", [0, 0, 0.5, 0, 0])):
+    for name, opacities in (("ramp", [0, 1]), ("clear", [0, 0]), ("band", [0, 0, 0.5, 0, 0]), ("high", [0, 0, 1])):
         changes(tab, lambda name=name: tab.click(f"#{name}"), f"the button {name}", name)
         found = tab.run(f"{PAGE}.state.function.Points")
         low, high = tab.run("range()")
