@@ -24,7 +24,7 @@ void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
 void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
                     const ConvertArguments& arguments);
 
-/// What has been stored of scalars: their largest errors, and the names of those that have one value everywhere.
+/// StoredScalars has the largest errors of scalars that are stored, and the names of those that have one value everywhere.
 struct StoredScalars {
   std::vector<double> errors;
   std::vector<std::string> constant;
