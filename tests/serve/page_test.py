@@ -185,6 +185,7 @@ def navigation(browser, server, caches):
     changes(tab, lambda: tab.key("x"), "the key x")
     changes(tab, lambda: tab.run("document.body.dispatchEvent(new KeyboardEvent('keydown', { key: 'R', shiftKey: true, bubbles: true }))"), "Shift and R")
     expect(tab.run(f"{PAGE}.state.camera") == first, "Shift and R show the first view, too")
+    changes(tab, lambda: tab.run("document.querySelector('[data-view=\"-y\"]').click()"), "looking from -y again")
     tab.key("?")
     tab.wait("document.getElementById('keys').open", "the list of keys")
     shot(tab, "keys")
