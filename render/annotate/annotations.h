@@ -30,7 +30,7 @@ struct Annotations {
   bool axes_grid = false;
   bool texts = false;    // the scene's title and label
   bool markers = false;  // the scene's
-  double text_size = 0;  // of the font, in pixels; 0: by the picture's height
+  double text_size = 0;  // of the font, in pixels; 0: by the picture's size
 
   /// Whether lines of them lie behind the data, which then has to be drawn over a transparent background.
   bool lieBehind() const { return axes_grid || outline; }
@@ -38,7 +38,7 @@ struct Annotations {
 };
 
 /// The size of the left part of `picture` that shows the data: all of it, or what the scalar bars leave. The
-/// width of their strip depends on the labels and the picture's height, and is at most half of the
+/// width of their strip depends on the labels and the picture's size, and is at most half of the
 /// picture's.
 ImageSize dataSize(const Annotations& annotations, ImageSize picture,
                    std::span<const ShownFunction> functions);
@@ -49,7 +49,7 @@ ImageSize dataSize(const Annotations& annotations, ImageSize picture, const Tran
 std::array<glm::dvec2, 3> axisNames(const AnnotatedScene& scene);
 
 /// The whole picture: `data`, which has the size of scene.view, over the background where it is transparent,
-/// and the annotations. Without a text size it follows the picture's height. Takes the memory of `data` if it is as
+/// and the annotations. Without a text size it follows the picture's size. Takes the memory of `data` if it is as
 /// large as the picture, and frees it otherwise. Throws Error if the picture is larger than Cairo supports
 /// (32,767 pixels a side).
 Image annotated(Image data, const Annotations& annotations, const AnnotatedScene& scene);

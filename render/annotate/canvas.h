@@ -101,9 +101,10 @@ inline void setInk(cairo_t* cairo, const glm::dvec3& rgb, double alpha = 1) {
   cairo_set_source_rgba(cairo, rgb.x, rgb.y, rgb.z, alpha);
 }
 
-/// The font's size in pixels, for a picture of this size. `wanted`: 0 for one that follows the height.
+/// The font's size in pixels, for a picture of this size. `wanted`: 0 for one that follows the height, or the width of a
+/// picture that is narrow, as on a phone: its scalar bar leaves space for the data.
 inline double fontSize(ImageSize size, double wanted) {
-  return wanted > 0 ? wanted : std::clamp(size.height / 42.0, 9.0, 96.0);
+  return wanted > 0 ? wanted : std::clamp(std::min(size.height / 42.0, size.width / 31.5), 9.0, 96.0);
 }
 
 /// Makes the font, which is of this size, smaller where text would be longer than `length`, and returns its size.

@@ -12,9 +12,18 @@
 #include "render/surface/map_image.h"
 
 namespace curvisplat {
+namespace {
+
+const Light kMatt = [] {
+  Light light;
+  light.specular = 0;
+  return light;
+}();
+
+}  // namespace
 
 SurfaceLight::SurfaceLight(const std::optional<Light>& light, const ScreenView& view)
-    : light_(light.value_or(Light{})), per_scale_(1.0 / view.scale) {
+    : light_(light.value_or(kMatt)), per_scale_(1.0 / view.scale) {
   if (light_.towards) towards_ = glm::vec3(glm::normalize(*light_.towards));
 }
 

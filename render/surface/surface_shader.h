@@ -38,7 +38,8 @@ struct LitPoints {
 /// Light on surfaces: that of the volume (render/project/light.h) with a strength of 1.
 class SurfaceLight {
  public:
-  /// `light`: none: a light where the viewer is.
+  /// `light`: none: a light where the viewer is, without highlights, which would whiten what is seen head-on: it has the
+  /// colours of the scalar bar.
   SurfaceLight(const std::optional<Light>& light, const ScreenView& view);
 
   /// `normal` in data coordinates, of any length above 0; `towards_viewer` in stretched space, of length 1.

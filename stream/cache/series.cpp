@@ -260,16 +260,18 @@ void cutAppended(const fs::path& cache, const Manifest& manifest) noexcept {
 
 namespace {
 
-/// The paths of the caches in the folder of one that is missing, absolute or relative as its path is.
-std::vector<std::string> cachesBeside(const fs::path& cache) {
+/// " (did you mean out/flow.splats?)": a cache in the folder of one that is missing, whose name without folder and ending is
+/// like its own; absolute or relative as its path is. Empty if there is none.
+std::string meantBeside(const fs::path& cache) {
   constexpr size_t kMax = 1000;
-  std::vector<std::string> caches;
+  std::vector<std::string> stems;
   std::error_code error;
   const fs::path folder = cache.parent_path();
   for (fs::directory_iterator at(folder.empty() ? "." : folder, error), end;
-       !error && at != end && caches.size() < kMax; at.increment(error))
-    if (at->path().extension() == ".splats") caches.push_back((folder / at->path().filename()).string());
-  return caches;
+       !error && at != end && stems.size() < kMax; at.increment(error))
+    if (at->path().extension() == ".splats") stems.push_back(at->path().stem().string());
+  const std::string close = closestTo(cache.stem().string(), stems);
+  return close.empty() ? "" : fmt::format(" (did you mean {}?)", (folder / (close + ".splats")).string());
 }
 
 }  // namespace
@@ -283,8 +285,7 @@ Manifest readManifest(const fs::path& cache) {
     throw Error(
         "{}: does not exist{}; expected a splat cache (convert the grid first: curvisplat convert GRID -o "
         "{})",
-        cache.string(), didYouMean(cache.string(), cachesBeside(cache)),
-        cache.extension() == ".splats" ? cache.string() : "NAME.splats");
+        cache.string(), meantBeside(cache), cache.extension() == ".splats" ? cache.string() : "NAME.splats");
   }
   if (!fs::is_directory(cache))
     throw Error(

@@ -191,7 +191,7 @@ TEST_F(Annotations, TextHasTheSizeThatIsAskedFor) {
   // The bar's colours are twice as wide.
   const auto barWidth = [](const Image& picture) {
     const auto isColour = [&](int x) {
-      const float* const pixel = picture.pixel(x, 80);
+      const float* const pixel = picture.pixel(x, picture.size.height / 2);
       return std::abs(pixel[0] - pixel[2]) > 0.1f || std::abs(pixel[0] - pixel[1]) > 0.1f;
     };
     int first = picture.size.width - 1;
@@ -203,6 +203,8 @@ TEST_F(Annotations, TextHasTheSizeThatIsAskedFor) {
   const Image large = render({"--scalar-bar", "--text-size", "18"});
   EXPECT_NEAR(barWidth(usual), 1.3 * 9, 1);
   EXPECT_NEAR(barWidth(large), 1.3 * 18, 1);
+  EXPECT_NEAR(barWidth(render({"--scalar-bar", "--size", "640x840"})), 1.3 * 840 / 42, 1);
+  EXPECT_NEAR(barWidth(render({"--scalar-bar", "--size", "315x840"})), 1.3 * 315 / 31.5, 1);
   const ProgramResult wrong =
       runProgram({"render", file("a.splats"), "-o", file("b.png"), "--axes", "--text-size", "2"});
   EXPECT_EQ(wrong.status, 2);

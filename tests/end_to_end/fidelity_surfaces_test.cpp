@@ -342,9 +342,7 @@ TEST_F(Sheets, WhatLiesBehindATranslucentSurfaceIsSeenThroughIt) {
     const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
       std::vector<ReferenceLayer> found;
       const double facing = std::abs(glm::dot(glm::normalize(kNormal), direction));
-      const glm::dvec3 lit =
-          glm::min((0.3 + 0.7 * facing) * glm::dvec3(kGrey) + glm::dvec3(0.25 * std::pow(facing, 32)),
-                   glm::dvec3(1.0));
+      const glm::dvec3 lit = (0.3 + 0.7 * facing) * glm::dvec3(kGrey);
       for (const glm::dvec3& p : kPoints)
         found.push_back({glm::dot(kNormal, p - origin) / glm::dot(kNormal, direction), lit, double{opacity}});
       std::sort(found.begin(), found.end(),

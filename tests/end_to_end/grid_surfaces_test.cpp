@@ -41,9 +41,7 @@ std::vector<ReferenceLayer> innerWall(const Scene& scene, const glm::dvec3& orig
     const glm::dvec3 at = origin + distance * direction;
     const glm::dvec3 normal = glm::dvec3(at.x, at.y, 0) / kInner;
     if (!scene.contains(at + 1e-9 * normal)) continue;
-    const double facing = std::abs(glm::dot(normal, direction));
-    const glm::dvec3 colour = glm::min(
-        (0.3 + 0.7 * facing) * glm::dvec3(kGrey) + glm::dvec3(0.25 * std::pow(facing, 32)), glm::dvec3(1.0));
+    const glm::dvec3 colour = (0.3 + 0.7 * std::abs(glm::dot(normal, direction))) * glm::dvec3(kGrey);
     return {{distance, colour, 1}};
   }
   return {};

@@ -293,6 +293,22 @@ class Messages(FormatCase):
         whole = self.run_program("convert", self.folder / "a.case", "-o", self.folder / "b.splats", "--steps", "all")
         self.assertEqual(whole.returncode, 0, whole.stderr)
 
+    def test_a_first_step_of_one_value_is_said(self):
+        head = f"I={NI} J={NJ} K={NK} STRANDID=1 SOLUTIONTIME="
+        second = self.tecplot("second.dat", head=head + "1").read_text().split("\n", 1)[1]
+        steps = self.tecplot("steps.dat", more=second, head=head + "0", values=np.zeros_like(VALUES))
+        note = "the first step has one value of T everywhere; --time-step 1 takes the last step"
+        for options, said in (([], True), (["--time-step", "0"], False), (["--time-step", "1"], False)):
+            result = self.run_program("convert", steps, "-o", self.folder / "a.splats", "--overwrite", *options)
+            self.assertEqual(note in result.stderr, said, result.stderr)
+
+    def test_a_missing_cache_is_taken_for_one_of_a_like_name(self):
+        """Folders and endings are alike in all of them."""
+        self.run_program("convert", self.case("flow"), "-o", self.folder / "flow.splats")
+        for name, meant in (("flwo.splats", True), ("crab.splats", False), ("mug.splats", False)):
+            text = self.expect_error(["render", self.folder / name, "-o", self.folder / "a.png"], "does not exist")
+            self.assertEqual("did you mean" in text, meant, text)
+
     def test_empty_files_are_of_no_format(self):
         for name in ("a.vtk", "a.xyz", "a"):
             self.assertNotIn("PLOT3D", self.expect_error(["info", self.write(name, "")], f"{name}: is empty; expected a grid file"))

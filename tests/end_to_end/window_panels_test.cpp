@@ -500,7 +500,7 @@ TEST_F(WindowPanels, SavesSeveralViews) {
   press("b");
   const Image dark = save();
   EXPECT_LT(difference(first, dark), 20);
-  choose("View", "Save this view...");
+  choose("View", "Save this view");
   widget("view view 2");
   click("view a/b view");
   EXPECT_GE(difference(save(), first), 50);

@@ -371,7 +371,12 @@ TEST_F(WindowTest, SavesAndLoadsAFunction) {
   const Image nothing = save();
   EXPECT_LT(difference(nothing, preset), 35);
   click("band");
-  EXPECT_LT(difference(save(), nothing), 35);
+  const Image band = save();
+  EXPECT_LT(difference(band, nothing), 35);
+  click("high");
+  const Image high = save();
+  EXPECT_LT(difference(high, nothing), 35);
+  EXPECT_LT(difference(high, band), 35);
   click("automatic");
   EXPECT_TRUE(eventually([&] { return difference(save(), chosen) >= 50; }));
   click("ramp");

@@ -198,6 +198,8 @@ class ForeignFormats : public testing::Test {
 TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
   write("a.szplt", "#!SZPLT\1\0\0\0"s);
   expectNamed("a.szplt", "a Tecplot subzone file");
+  write("restart.dat", "\xec\x2b\x08\0\4\0\0\0"s + std::string(99, '\0'));
+  expectNamed("restart.dat", "a restart file of SU2");
   write("a.geo", "C Binary" + std::string(72, ' '));
   expectNamed("a.geo", "an EnSight geometry file");
   write("b.geo", "\x50\0\0\0Fortran Binary"s + std::string(72, ' '));

@@ -385,10 +385,7 @@ namespace {
 
 glm::dvec3 litAtViewer(const glm::dvec3& colour, const glm::dvec3& normal, const glm::dvec3& direction) {
   const ReferenceLight light;
-  const double facing = std::abs(glm::dot(normal, direction));
-  return glm::min(
-      (light.ambient + light.diffuse * facing) * colour + glm::dvec3(light.specular * std::pow(facing, 32)),
-      glm::dvec3(1.0));
+  return (light.ambient + light.diffuse * std::abs(glm::dot(normal, direction))) * colour;
 }
 
 }  // namespace

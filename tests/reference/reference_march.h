@@ -81,7 +81,7 @@ struct ReferenceLayer {
 using ReferenceLayers =
     std::function<std::vector<ReferenceLayer>(const glm::dvec3& origin, const glm::dvec3& direction)>;
 
-/// A plane of one colour, or a sphere, opaque and lit from where the viewer is (ReferenceLight without g0).
+/// A plane of one colour, or a sphere, opaque and lit from where the viewer is (ReferenceLight without g0 and highlights).
 ReferenceLayers planeLayer(const glm::dvec3& point, const glm::dvec3& normal, const glm::dvec3& colour);
 ReferenceLayers sphereLayer(const glm::dvec3& centre, double radius, const glm::dvec3& colour);
 /// A slice through the field, in the colours of the function.

@@ -44,11 +44,13 @@ TEST(Reports, SayWhereTheOptionsAre) {
   EXPECT_EQ(inWindowsWords(blank), blank + where);
   const std::string iblank = "read it without iblank (--iblank no)";
   EXPECT_EQ(inWindowsWords(iblank), iblank + where);
+  const std::string grid = "left out: V, on another grid (x, y, z); select that grid with --scalar NAME";
+  EXPECT_EQ(inWindowsWords(grid), grid + where);
   const std::string backend = "no memory is left; give --backend cpu";
   EXPECT_EQ(inWindowsWords(backend), backend + " (an option of \"curvisplat view\" in a terminal)");
   EXPECT_EQ(inWindowsWords("ask for a smaller --size"), "ask for a smaller size");
-  for (const char* plain : {"--surface walls names no face", "a.xyz: is truncated",
-                            "wing--fine.cgns: cannot be read", "a -- b", "--"})
+  for (const char* plain : {"--surface walls names no face", "it is drawn without them, by --scalar",
+                            "a.xyz: is truncated", "wing--fine.cgns: cannot be read", "a -- b", "--"})
     EXPECT_EQ(inWindowsWords(plain), plain);
 }
 

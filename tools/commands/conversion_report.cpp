@@ -216,7 +216,7 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   finish(forecast, options.convert, arguments);
 }
 
-std::vector<double> printStored(const std::filesystem::path& cache, uint64_t step, std::string_view where) {
+StoredScalars printStored(const std::filesystem::path& cache, uint64_t step, std::string_view where) {
   std::vector<VariableInfo> variables;
   std::vector<ValueErrors> errors;
   try {
@@ -232,14 +232,16 @@ std::vector<double> printStored(const std::filesystem::path& cache, uint64_t ste
   } catch (const std::exception& error) {
     printMessage("warning: the cache is complete, but it cannot be read back: {}", error.what());
   }
-  std::vector<double> largest;
+  StoredScalars stored;
   for (size_t n = 0; n < variables.size(); ++n) {
     const auto& [number, name, unit, min, max] = variables[n];
-    printLine("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}, typically {:.1e}", name, where, min, max,
+    printLine("{}{}: {:.6g} .. {:.6g}{}, rounded within {:.1e}, typically {:.1e}", name, where, min + 0.0,
+              max + 0.0,  // not -0
               unit.empty() ? "" : " " + unit, errors[n].largest, errors[n].typical);
-    largest.push_back(errors[n].largest);
+    stored.errors.push_back(errors[n].largest);
+    if (min == max) stored.constant.push_back(name);
   }
-  return largest;
+  return stored;
 }
 
 }  // namespace curvisplat

@@ -24,10 +24,15 @@ void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
 void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
                     const ConvertArguments& arguments);
 
+/// StoredScalars has the largest errors of scalars that are stored, and the names of those that have one value everywhere.
+struct StoredScalars {
+  std::vector<double> errors;
+  std::vector<std::string> constant;
+};
+
 /// Prints a line for each scalar of a cache that has just been written: "p: 0.1 .. 2.5 Pa, rounded within 1.8e-05, typically
-/// 1.0e-05". `where` follows the scalar's name. Returns the largest errors, by scalar. Prints a warning, and returns none, if the
-/// cache cannot be read; that does not undo the conversion.
-std::vector<double> printStored(const std::filesystem::path& cache, uint64_t step = 0,
-                                std::string_view where = "");
+/// 1.0e-05". `where` follows the scalar's name. Prints a warning, and returns nothing, if the cache cannot be read; that does not
+/// undo the conversion.
+StoredScalars printStored(const std::filesystem::path& cache, uint64_t step = 0, std::string_view where = "");
 
 }  // namespace curvisplat

@@ -23,6 +23,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/memory.h"
+#include "stream/base/name_list.h"
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 #include "stream/cache/cache_reader.h"
@@ -197,7 +198,13 @@ void runConvert(ConvertArguments arguments) {
   printWarnings(source->description(), arguments.grid.time_step, report);
   for (const std::string& note : notes) printMessage("note: {}", note);
   printSummary(arguments, report, secondsOf(progress));
-  for (const double largest : printStored(options.output)) numbers["stored_within"].push_back(largest);
+  const StoredScalars stored = printStored(options.output);
+  for (const double largest : stored.errors) numbers["stored_within"].push_back(largest);
+  // The first step of a run often holds nothing but what it starts from.
+  const size_t steps = source->description().times.size();
+  if (!arguments.grid.time_step && steps > 1 && !stored.constant.empty())
+    printMessage("note: the first step has one value of {} everywhere; --time-step {} takes the last step",
+                 listed(stored.constant, 3), steps - 1);
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 

@@ -518,7 +518,8 @@ void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, con
       ->group(group);
   command
       .add_option("--text-size", arguments.text_size,
-                  "Size of the font of all these, in pixels (default: 1/42 of the picture's height)")
+                  "Size of the font of all these, in pixels (default: 1/42 of the picture's height, at most "
+                  "2/63 of its width)")
       ->group(group);
 }
 

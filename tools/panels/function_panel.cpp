@@ -26,6 +26,7 @@ constexpr size_t kBins = 128;
 constexpr float kGrabRadius = 0.6f;  // around a point, in lines of text
 constexpr float kCurveLines = 9;     // height in lines of text
 constexpr OpacityPoint kBand[] = {{0, 0}, {0.4, 0}, {0.5, 0.5}, {0.6, 0}, {1, 0}};
+constexpr OpacityPoint kHigh[] = {{0, 0}, {0.7, 0}, {1, 1}};
 constexpr OpacityPoint kClear[] = {{0, 0}, {1, 0}};
 
 /// The definitions of the colour maps, each made once.
@@ -374,6 +375,7 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
 
 void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   label("opacities");
+  const float column = ImGui::GetCursorPosX();
   const auto button = [](const char* name, const char* text, const char* what) {
     const bool pressed = ImGui::Button(text);
     nameWidget(name);
@@ -383,7 +385,7 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   result.automatic_opacities |=
       button("automatic", "Automatic",
              "range and opacities chosen from the data; a colour map that you chose stays");
-  const float gap = ImGui::GetStyle().ItemInnerSpacing.x;  // four of them fill the line
+  const float gap = ImGui::GetStyle().ItemInnerSpacing.x;  // four of them fill a line
   ImGui::SameLine(0, gap);
   if (button(
           "ramp", "Ramp",
@@ -396,13 +398,19 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   }
   const auto set = [&](const char* name, const char* text, const char* what,
                        std::span<const OpacityPoint> points) {
-    ImGui::SameLine(0, gap);
+    const float width = ImGui::CalcTextSize(text).x + 2 * ImGui::GetStyle().FramePadding.x;
+    const float end = ImGui::GetWindowPos().x + ImGui::GetContentRegionMax().x;
+    if (ImGui::GetItemRectMax().x + gap + width <= end)
+      ImGui::SameLine(0, gap);
+    else
+      ImGui::SetCursorPosX(column);
     if (!button(name, text, what)) return;
     function.setOpacities({points.begin(), points.end()});
     result.changed = true;
   };
   set("band", "Band", "values in the middle of the range alone; Shift + drag moves its points together",
       kBand);
+  set("high", "High", "high values alone; drag the point where they begin to another value", kHigh);
   set("clear", "Clear", "everything transparent; then click into the curve where values are to be seen",
       kClear);
 }

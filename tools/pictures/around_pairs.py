@@ -118,8 +118,6 @@ def actor_of(port, scene, colour=None, opacity=1.0):
         look.SetInterpolationToPhong()
         look.SetAmbient(0.3)
         look.SetDiffuse(0.7)
-        look.SetSpecular(0.25)
-        look.SetSpecularPower(32)
     look.SetOpacity(opacity)
     return actor
 

@@ -42,7 +42,9 @@ std::string inWindowsWords(const std::string& message) {
   for (size_t at = text.find("--"); at != text.npos; at = text.find("--", at + 2)) {
     if (!isOptionAt(text, at)) continue;
     const auto is = [&](std::string_view option) { return text.compare(at, option.size(), option) == 0; };
-    if (is("--surface") || is("--scalar") || is("--iso")) continue;  // which the window has, by other names
+    if (is("--surface") || is("--iso")) continue;  // which the window has, by other names
+    const bool of_conversion = std::string_view(text).substr(0, at).ends_with("with ");
+    if (is("--scalar") && !of_conversion) continue;  // the window draws all that a cache has
     const bool of_drawing = is("--backend") || is("--card");
     return text +
            (of_drawing

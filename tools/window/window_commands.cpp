@@ -64,7 +64,7 @@ constexpr std::array kCommands{
     CommandInfo{Command::kOtherProjection, "View", "Perspective", GLFW_KEY_O, !kShift, !kControl, "O",
                 kGroup},
     CommandInfo{Command::kFly, "View", "Fly (W S A D Q E move)", GLFW_KEY_F, !kShift, !kControl, "F"},
-    CommandInfo{Command::kSaveView, "View", "Save this view...", 0, false, false, "", kGroup},
+    CommandInfo{Command::kSaveView, "View", "Save this view", 0, false, false, "", kGroup},
     CommandInfo{Command::kLight, "Picture", "Lighting", GLFW_KEY_L, !kShift, !kControl, "L"},
     CommandInfo{Command::kDarkBackground, "Picture", "Dark background", GLFW_KEY_B, !kShift, !kControl, "B"},
     CommandInfo{Command::kScalarBar, "Picture", "Scalar bar", 0, false, false, "", kGroup},

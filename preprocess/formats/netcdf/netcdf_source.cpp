@@ -132,8 +132,8 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
     if (const auto format = foreignNetcdf(file))
       throw Error("{}: is {}; {}", file.path().string(), *format,
                   file.plainHdf5() ? "describe its arrays in an XDMF file (.xmf), or write NetCDF-4 or CGNS"
-                                   : "structured grids are read, and UGRID, ICON and MPAS in files that have "
-                                     "their faces and nodes");
+                                   : "structured grids are read, and UGRID, ICON, MPAS and FESOM with the "
+                                     "file of their faces and nodes (give it after this one)");
     std::string why = nearestToGrid(file);
     if (!file.groups().empty() && std::filesystem::is_directory(file.path()))
       why =

@@ -58,6 +58,7 @@ constexpr Magic kMagics[] = {
     {"MATLAB 5.0 MAT-file"sv,
      "a MATLAB file, which is not read (save it with -v7.3 and describe its arrays in an XDMF file)"},
     {"MATLAB 7.3 MAT-file"sv, "a MATLAB file (HDF5), whose arrays an XDMF file has to describe"},
+    {"\xec\x2b\x08\0"sv, "a restart file of SU2, which goes after its mesh (.su2)"},
     {"\x93NUMPY"sv, "a NumPy array without a grid, which is not read (an XDMF file describes arrays)"},
     {"\0\0\0\x10"
      "FILEHEAD"sv,
