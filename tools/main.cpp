@@ -191,15 +191,14 @@ void refuseOptionsAsValues(CLI::App& app) {
     refuseOptionsAsValues(*command);
 }
 
-/// CLI11 takes the next word where nothing follows "=", and an option that is followed by an empty word for one that was not given.
+/// CLI11 takes the next word where nothing follows "=", and an option before an empty word for one that was not given.
 void refuseEmptyValues(std::span<const char* const> words) {
   std::string_view before;
   for (const std::string_view word : words) {
-    if (word.empty() && before.size() > 1 && before.starts_with('-') && before != "--")
-      throw UsageError("{}: needs a value (found '', as of a variable of the shell that is not set)", before);
+    if (word.empty() && before == "--scalar-bar-title") continue;  // a bar without a title
     if (word.empty())
-      throw UsageError(
-          "an argument is empty, as of a variable of the shell that is not set; expected a name");
+      throw UsageError("found an empty word{}, as of a variable of the shell that is not set",
+                       before.starts_with('-') ? fmt::format(" behind {}", before) : "");
     if (word == "--") return;
     if (word.starts_with("--") && word.find('=') + 1 == word.size())
       throw UsageError("{}: needs a value (found nothing behind '=')", word.substr(0, word.size() - 1));

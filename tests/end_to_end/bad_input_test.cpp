@@ -201,9 +201,10 @@ TEST_F(BadInput, InvalidOptionValues) {
           "--blank 'none': is not a number, or is too large");
   refused({"convert", file("scene.xyz"), "--threads", "1025"},
           "--threads '1025': expected a number from 0 to 1024");
-  refused({"convert", file("scene.xyz"), "--threads", ""}, "--threads: needs a value (found ''");
-  refused({"convert", file("scene.xyz"), "--scalar", "", "-o", file("a.splats")}, "--scalar: needs a value");
-  refused({"render", "", "-o", file("a.png")}, "an argument is empty");
+  refused({"convert", file("scene.xyz"), "--threads", ""}, "found an empty word behind --threads, as of");
+  refused({"convert", file("scene.xyz"), "--scalar", "", "-o", file("a.splats")},
+          "found an empty word behind --scalar, as of");
+  refused({"render", "", "-o", file("a.png")}, "found an empty word, as of");
   refused({"render", file("whole.splats"), "--tf", "viridis", "--tf", "magma"},
           "--tf takes one value, found 2");
   refused({"convert", file("scene.xyz"), "-o"}, "--output needs a value");

@@ -349,7 +349,8 @@ def editing(tab):
     expect(all(abs(a - b) < 1e-5 for a, b in zip(tab.run("range()"), expected)), f"percentiles: {tab.run('range()')}, {expected}")
     changes(tab, lambda: set_value(tab, "#high", "0.8"), "another range")
     changes(tab, lambda: set_value(tab, "#unit", "0.5"), "another opacity unit")
-    for name, opacities in (("ramp", [0, 1]), ("clear", [0, 0]), ("band", [0, 0, 0.5, 0, 0]), ("high", [0, 0, 1])):
+    expect(tab.run("(ids => new Set(ids).size === ids.length)([...document.querySelectorAll('[id]')].map(e => e.id))"), "each id is one element's")
+    for name, opacities in (("ramp", [0, 1]), ("clear", [0, 0]), ("band", [0, 0, 0.5, 0, 0]), ("high-values", [0, 0, 1])):
         changes(tab, lambda name=name: tab.click(f"#{name}"), f"the button {name}", name)
         found = tab.run(f"{PAGE}.state.function.Points")
         low, high = tab.run("range()")

@@ -82,7 +82,7 @@ struct FileNote {
 };
 
 std::optional<FileNote> notedOf(const fs::path& memo, const std::string& stamp) {
-  constexpr uint64_t kMaxMemo = 1 << 20;
+  constexpr uint64_t kMaxMemo = 16 << 20;  // the names of thousands of linked files
   std::error_code error;
   if (!fs::is_regular_file(memo, error)) return std::nullopt;
   try {
@@ -119,9 +119,9 @@ void note(const fs::path& memo, const std::string& stamp, const FileNote& of_fil
 /// The files that a file of HDF5 leads to, from `known` if it has not changed since; nullopt where it leads out of its folder, or is
 /// damaged: whoever opens it reports that.
 std::optional<std::set<fs::path>> linkedBy(const fs::path& path, const fs::path& known) {
-  if (beginningOf(InputFile(path), kHdf5Signature.size()) != kHdf5Signature) return std::set<fs::path>{};
-  if (const auto noted = notedOf(memoOf(path, known), stampOf(path))) return noted->linked;
   try {
+    if (beginningOf(InputFile(path), kHdf5Signature.size()) != kHdf5Signature) return std::set<fs::path>{};
+    if (const auto noted = notedOf(memoOf(path, known), stampOf(path))) return noted->linked;
     tryHdf5(path);
     return linkedFilesOf(path);
   } catch (const Error&) {
@@ -263,7 +263,8 @@ class StampedFiles {
     if (!seen_.emplace(depth, file.lexically_normal()).second) return;
     all_.push_back(file);
     if (const auto files = linkedBy(file, known_))
-      for (const fs::path& linked : *files) add(linked, depth);
+      for (const fs::path& linked : *files)
+        if (fs::is_regular_file(linked, error)) add(linked, depth);
     constexpr int kMaxDepth = 3;  // a .pvd of .vtm of .vts
     if (depth == kMaxDepth) return;
     constexpr size_t kMaxPatterns = 1000;  // each lists a folder
