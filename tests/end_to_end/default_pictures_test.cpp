@@ -159,11 +159,12 @@ TEST_P(DefaultPicturesOfRealGrids, ShowSomething) {
   Words words{"convert"};
   for (const std::string& name : GetParam().files) words.push_back((data / name).string());
   words.insert(words.end(), {"-o", (folder / "a.splats").string()});
-  for (const std::string& scalar : GetParam().scalars) words.insert(words.end(), {"--scalar", scalar});
+  Words tried;
+  for (size_t n = 0; n < GetParam().scalars.size(); ++n)
+    if (faults::isTried(n, 3)) tried.push_back(GetParam().scalars[n]);
+  for (const std::string& scalar : tried) words.insert(words.end(), {"--scalar", scalar});
   run(words);
-  size_t number = 0;
-  for (const std::string& scalar : GetParam().scalars) {
-    if (!faults::isTried(number++, 2)) continue;
+  for (const std::string& scalar : tried) {
     const std::string picture = (folder / "a.png").string();
     const ProgramResult drawn = run(
         {"render", (folder / "a.splats").string(), "-o", picture, "--size", "240x240", "--scalar", scalar});
@@ -249,7 +250,7 @@ class DefaultDetail : public ProgramSuite<DefaultDetail> {
  protected:
   static void prepare() {
     for (const auto& [scene, size] :
-         {std::pair{"half-annulus", "192x96x96"}, std::pair{"sheared-waves", "96x96x96"}})
+         {std::pair{"half-annulus", "192x96x96"}, std::pair{"sheared-waves", "64x64x64"}})
       madeCache(file(scene), scene, size);
   }
 
@@ -257,7 +258,7 @@ class DefaultDetail : public ProgramSuite<DefaultDetail> {
   static uint64_t draw(const std::string& scene, const std::string& name, const Words& options,
                        const Words& more = {}) {
     run(Words{"render", file(scene + ".splats"), "-o", file(name + ".pfm"), "--size",
-              scene == "half-annulus" ? "128x128" : "88x88", "--stats", file("stats.json")} +
+              scene == "half-annulus" ? "128x128" : "60x60", "--stats", file("stats.json")} +
         options + more);
     return jsonOf(file("stats.json"))["frames"][0]["splats_drawn"];
   }

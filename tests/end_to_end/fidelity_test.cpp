@@ -51,7 +51,8 @@ void leavePictures(const std::string& name, const Image& picture, const Image& r
   std::filesystem::create_directories(folder);
   writeImage(picture, folder / (name + "_picture.png"));
   writeImage(reference, folder / (name + "_reference.png"));
-  writeImage(absoluteDifference(picture, reference), folder / (name + "_difference_x20.png"));
+  if (picture.size == reference.size)  // else the reference is of some of its pixels
+    writeImage(absoluteDifference(picture, reference), folder / (name + "_difference_x20.png"));
   ADD_FAILURE() << "pictures are in " << folder;
 }
 
@@ -415,8 +416,9 @@ class GradientOpacityFidelity : public Fidelity {
       const double share = static_cast<double>(below) / static_cast<double>(steepness_.size());
       return std::clamp((share - kHidden) / (kWhole - kHidden), 0.0, 1.0);
     };
-    return toImage(
-        referenceMarch(field_, function_.exact, halfAnnulusCamera(), kSize, stepsFor(field_), extras));
+    MarchSteps steps = stepsFor(field_);
+    steps.every = faults::isWholeSweep() ? 1 : 2;  // gradients take six more values of the field
+    return toImage(referenceMarch(field_, function_.exact, halfAnnulusCamera(), kSize, steps, extras));
   }
 
   /// Every painter draws what is marched, at the finest level and a coarse one, and neither without the opacity by
@@ -433,16 +435,19 @@ class GradientOpacityFidelity : public Fidelity {
       FrameOptions unlit = options;
       unlit.light = std::nullopt;
       const Image drawn = drawnWith(options, Backend::kCpu);
-      const auto dbOf = [&](const Image& picture) { return compareImages(picture, reference).psnr_db; };
+      const auto dbOf = [&](const Image& picture) {
+        return compareWithReference(picture, reference).psnr_db;
+      };
       const double db = dbOf(drawn), whole_db = dbOf(drawnWith(whole, Backend::kCpu)),
                    unlit_db = dbOf(drawnWith(unlit, Backend::kCpu));
-      const Image by_gl = drawnWith(options, Backend::kOsmesa);
-      const double gl_db = compareImages(by_gl, drawn).psnr_db;
-      fmt::print("{} at {} pixels: {:.1f} dB, OpenGL {:.1f} dB; without {:.1f} dB, without light {:.1f} dB\n",
-                 name, whole.lod_pixels, db, dbOf(by_gl), whole_db, unlit_db);
+      fmt::print("{} at {} pixels: {:.1f} dB; without {:.1f} dB, without light {:.1f} dB\n", name,
+                 whole.lod_pixels, db, whole_db, unlit_db);
       EXPECT_GE(db, least_db[level]) << name << whole.lod_pixels;
-      EXPECT_GE(dbOf(by_gl), least_db[level]) << name << whole.lod_pixels;
-      EXPECT_GE(gl_db, 60) << name << whole.lod_pixels;
+      if (level > 0 || faults::isWholeSweep()) {  // as in expectPsnr(), usually the coarser picture
+        const Image by_gl = drawnWith(options, Backend::kOsmesa);
+        EXPECT_GE(dbOf(by_gl), least_db[level]) << name << whole.lod_pixels;
+        EXPECT_GE(compareImages(by_gl, drawn).psnr_db, 60) << name << whole.lod_pixels;
+      }
       EXPECT_LT(whole_db, 30) << name << whole.lod_pixels;
       if (light) {
         EXPECT_LT(unlit_db, 30) << name << whole.lod_pixels;

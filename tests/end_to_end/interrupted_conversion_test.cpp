@@ -39,7 +39,7 @@ class InterruptedConversion : public ProgramSuite<InterruptedConversion> {
   // Makes a grid so large that the least memory takes several buckets.
   static void prepare() {
     Progress progress;
-    writePlot3d(SceneGridSource(makeScene("wake"), {160, 100, 90}), *folder_ / "in", progress);
+    writePlot3d(SceneGridSource(makeScene("wake"), {120, 80, 70}), *folder_ / "in", progress);
     const fs::path undisturbed = *folder_ / "a.splats";
     run(wordsFor(undisturbed, {}));
     expected_ = checksumsOf(undisturbed);
@@ -50,10 +50,10 @@ class InterruptedConversion : public ProgramSuite<InterruptedConversion> {
   }
   Words convert(const Words& more) const { return wordsFor(output_, more); }
 
-  /// Starts a conversion, and returns once it has appended `bricks`.
+  /// Starts a conversion, and returns once it has appended `bricks`. By one thread it takes long enough to be met under way.
   std::unique_ptr<RunningProgram> startedUntil(int bricks, const Words& more = {}) const {
     FolderWatch outside(output_.parent_path());
-    auto program = std::make_unique<RunningProgram>(wordsFor(output_, more));
+    auto program = std::make_unique<RunningProgram>(wordsFor(output_, more + Words{"--threads", "1"}));
     outside.waitUntil([&] { return fs::exists(partial()); });
     FolderWatch inside(partial());
     inside.waitUntil([&] { return bricksAppended() >= bricks; });

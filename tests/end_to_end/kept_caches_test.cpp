@@ -115,7 +115,7 @@ TEST_F(KeptCaches, AFullDiskIsRefusedWithWhatHelpsThere) {
 }
 
 TEST_F(KeptCaches, FilesThatChangeMeanwhileAreConvertedAgain) {
-  run({"generate", "half-annulus", "--size", "120x100x80", "-o", "changing"});
+  run({"generate", "half-annulus", "--size", "100x70x60", "-o", "changing"});
   RunningProgram first({"render", "changing.xyz", "changing.fun", "-o", "grid.png", "--size", "20x20"});
   ASSERT_TRUE(eventually([] {
     if (!fs::exists("kept/curvisplat")) return false;
@@ -141,7 +141,7 @@ TEST_F(KeptCaches, FilesThatChangeMeanwhileAreConvertedAgain) {
 }
 
 TEST_F(KeptCaches, OfAGridThatIsStoppedNothingStays) {
-  run({"generate", "half-annulus", "--size", "200x120x100", "-o", "stopped"});
+  run({"generate", "half-annulus", "--size", "120x100x80", "-o", "stopped"});
   RunningProgram render({"render", "stopped.xyz", "stopped.fun", "-o", "grid.png", "--size", "20x20"});
   const auto bytes_of_partial = [] {
     uint64_t bytes = 0;
@@ -171,10 +171,10 @@ void writeSet(const std::string& set, const std::string& file, int times) {
 // Each block was once compared with every other one, which took more than a minute.
 TEST_F(KeptCaches, InfoOfASetThatNamesOneFileThousandsOfTimesEnds) {
   writeFileAtomically("one.vts", vtsFile(annulusVtsGrid(2, 2, 2), {}));
-  writeSet("many.vtm", "one.vts", 5000);
+  writeSet("many.vtm", "one.vts", 2000);
   const ProgramResult result = run({"info", "many.vtm"});
-  expectSays(result.out, "nodes     40000 in 5000 blocks");
-  expectSays(result.out, "cells     5000; 0 degenerate");
+  expectSays(result.out, "nodes     16000 in 2000 blocks");
+  expectSays(result.out, "cells     2000; 0 degenerate");
 }
 
 TEST_F(KeptCaches, SetsThatNameFilesThousandsOfTimesAreSearchedOnce) {

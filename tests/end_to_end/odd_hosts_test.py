@@ -314,7 +314,7 @@ class OddHosts(unittest.TestCase):
         locales = self.folder / "locales"
         locales.mkdir()
         made = 0
-        for name in ("de_DE", "tr_TR", "fr_FR"):
+        for name in some_of(("tr_TR", "de_DE", "fr_FR"), 3):  # a comma before decimals, and in Turkish other capitals
             subprocess.run(["localedef", "-i", name, "-f", "UTF-8", "--no-archive", locales / f"{name}.UTF-8"],
                            capture_output=True, check=False)
             if not (locales / f"{name}.UTF-8" / "LC_NUMERIC").exists():

@@ -119,6 +119,7 @@ class RealGrids : public ProgramTest, public testing::WithParamInterface<RealGri
 TEST_P(RealGrids, MakeAWholeCacheAndAPictureThatRepeats) {
   run({"info", cache(), "--verify"});
   for (const std::string view : {"iso", "+z", "-y"}) {
+    if (view == "+z" && !faults::isWholeSweep()) continue;
     const std::string picture = folder_ / "picture.pfm", again = folder_ / "again.pfm";
     const auto draw = [&](const std::string& output, const std::string& threads) {
       run({"render", cache(), "--view", view, "--size", "300x300", "-o", output, "--threads", threads,

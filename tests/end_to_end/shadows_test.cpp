@@ -22,6 +22,7 @@
 #include "tests/reference/function_grid.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/reference/reference_march.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -266,13 +267,14 @@ TEST_F(Shadows, AreThoseOfTheReferenceMarch) {
       const std::optional<Light> lit = options.light;
       const Image drawn = draw(Backend::kCpu, lit);
       const double on_db = compareImages(drawn, reference).psnr_db,
-                   off_db = compareImages(draw(Backend::kCpu, std::nullopt), reference).psnr_db,
-                   gl_db = compareImages(draw(Backend::kOsmesa, lit), drawn).psnr_db;
-      fmt::print("{} at {} pixels: {:.1f} dB, without {:.1f} dB, OpenGL {:.1f} dB\n", row.name, lod_pixels,
-                 on_db, off_db, gl_db);
+                   off_db = compareImages(draw(Backend::kCpu, std::nullopt), reference).psnr_db;
+      fmt::print("{} at {} pixels: {:.1f} dB, without {:.1f} dB\n", row.name, lod_pixels, on_db, off_db);
       EXPECT_GE(on_db, row.least_db) << row.name << lod_pixels;
       EXPECT_LT(off_db, row.most_db_without) << row.name << lod_pixels;
-      EXPECT_GE(gl_db, 60) << row.name << lod_pixels;
+      // It takes OpenGL seconds on the processor to draw a quarter of a million splats.
+      if (lod_pixels > 0 || faults::isWholeSweep()) {
+        EXPECT_GE(compareImages(draw(Backend::kOsmesa, lit), drawn).psnr_db, 60) << row.name << lod_pixels;
+      }
       options.light = lit;
     }
   }

@@ -14,6 +14,7 @@
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
@@ -71,6 +72,8 @@ TEST_F(SurfaceOptions, EveryPainterDrawsTheSame) {
     helix += fmt::format("{},{},{}\n", 2 + 0.02 * n, 1.6 * std::sin(0.1 * n), 1.6 * std::cos(0.1 * n));
   writeFileAtomically(file("helix.csv"), helix);
   for (const char* angle : {"0", "40"}) {
+    // LinesAreTheSameFromEveryFormat has a picture in perspective by both painters.
+    if (angle == std::string("40") && !faults::isWholeSweep()) continue;
     Words options{"--surface",       file("sphere.obj"),
                   "--slice",         "4,0,0,1,0.2,0.1",
                   "--slice",         "4,0,0,0,0,1",
@@ -323,6 +326,7 @@ TEST_F(SurfaceOptions, AreDrawnThoughSplatsAreLargerThanSinglePrecision) {
   for (const Words& look : {Words{"--zoom", "1e25"}, Words{"--parallel-scale", "1e-30"}})
     for (const Words& what :
          {Words{"--slice", "4,0,2,0,1,0"}, Words{"--surface", "kmin"}, Words{"--iso", "0.3"}}) {
+      if (look[0] != "--zoom" && what[0] != "--slice" && !faults::isWholeSweep()) continue;
       const Image image = picture(look + what);
       EXPECT_TRUE(
           std::all_of(image.rgba.begin(), image.rgba.end(), [](float c) { return std::isfinite(c); }));

@@ -41,7 +41,7 @@ const TransferFunction& hues() {
 class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
  protected:
   static void prepare() {
-    convertTo("a.splats", 0, {128, 64, 64});
+    convertTo("a.splats", 0, {128, 64, 64}, 3);
     convertTo("small.splats", 0, {40, 24, 24});
   }
 
@@ -69,17 +69,19 @@ class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
   Image marched(const OpticalFunction& opacity, const ReferenceField& field,
                 const ReferenceLayers& layers = {}, ImageSize size = kSize) const {
     const TwoScalars scalars{opacity, [](const glm::dvec3& at) { return hues().at(hueAt(at)).colour; }};
-    return toImage(referenceMarch(field, scalars, halfAnnulusCamera(), size, stepsFor(field), layers));
+    MarchSteps steps = stepsFor(field);
+    steps.every = faults::isWholeSweep() ? 1 : size.width / kSmall.width;
+    return toImage(referenceMarch(field, scalars, halfAnnulusCamera(), size, steps, layers));
   }
-  Image drawn(const TransferFunction& opacity, const FrameOptions& options,
-              Backend backend = Backend::kCpu) const {
-    const CacheReader cache(*folder_ / "a.splats");
+  Image drawn(const TransferFunction& opacity, const FrameOptions& options, Backend backend = Backend::kCpu,
+              const char* name = "a.splats") const {
+    const CacheReader cache(*folder_ / name);
     FrameRenderer renderer(cache, DrawnScalars({0, opacity}, {1, hues()}), backend);
     FrameStatistics statistics;
     return renderer.render(halfAnnulusCamera(), options, statistics);
   }
   static double db(const Image& image, const Image& reference) {
-    return compareImages(image, reference).psnr_db;
+    return compareWithReference(image, reference).psnr_db;
   }
 
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
@@ -245,6 +247,7 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheOpacitiesOfTheOther) {
              by_function, even);
   EXPECT_GE(by_function, 67);
   EXPECT_LT(even, 35);
+  if (!faults::isWholeSweep()) return;  // AreOfAllScalarsAtOnce has the same bits with any threads, too
   options.threads = 1;
   options.memory_bytes = uint64_t{96} << 20;
   EXPECT_EQ(drawn(function.table, options).rgba, picture.rgba);
@@ -279,8 +282,9 @@ TEST_F(TwoScalarsTest, IsosurfacesAreOfAllScalarsAtOnce) {
   options.scene = scene;
   // The first has more nodes than isosurfaces are contoured in the cells of.
   for (const uint64_t nodes : {130, 128}) {
-    convertTo("three.splats", 0, {nodes, 64, 64}, 3);
-    const CacheReader cache(*folder_ / "three.splats");
+    const char* const name = nodes == 128 ? "a.splats" : "three.splats";
+    if (nodes != 128) convertTo(name, 0, {nodes, 64, 64}, 3);
+    const CacheReader cache(*folder_ / name);
     const auto drawn_with = [&](const FrameOptions& with) {
       FrameRenderer renderer(cache, DrawnScalars({0, function.table}, {1, hues()}), Backend::kCpu);
       FrameStatistics statistics;
@@ -288,15 +292,18 @@ TEST_F(TwoScalarsTest, IsosurfacesAreOfAllScalarsAtOnce) {
     };
     const Image picture = drawn_with(options);
     const double all = db(picture, reference);
-    FrameOptions fewer = options;
-    auto without = std::make_shared<SurfaceScene>(*scene);
-    without->further_isosurfaces.pop_back();
-    fewer.scene = without;
-    const double without_third = db(drawn_with(fewer), reference);
-    fmt::print("isosurfaces of three scalars, {} nodes along i: {:.1f} dB, without the third {:.1f} dB\n",
-               nodes, all, without_third);
+    fmt::print("isosurfaces of three scalars, {} nodes along i: {:.1f} dB\n", nodes, all);
     EXPECT_GE(all, 34.5);  // outlines are smooth here
-    EXPECT_LT(without_third, 30);
+    if (nodes == 128 || faults::isWholeSweep()) {
+      FrameOptions fewer = options;
+      auto without = std::make_shared<SurfaceScene>(*scene);
+      without->further_isosurfaces.pop_back();
+      fewer.scene = without;
+      const double without_third = db(drawn_with(fewer), reference);
+      fmt::print("without the third {:.1f} dB\n", without_third);
+      EXPECT_LT(without_third, 30);
+    }
+    if (nodes == 128 && !faults::isWholeSweep()) continue;
     options.threads = 1;
     options.memory_bytes = uint64_t{192} << 20;
     EXPECT_EQ(drawn_with(options).rgba, picture.rgba);
@@ -329,7 +336,7 @@ TEST_F(TwoScalarsTest, IsosurfacesOfAnotherHaveTheOpacitiesOfTheOneScalar) {
 
 /// Bricks are left out by the bounds of the isosurface's scalar, not of the other's.
 TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
-  convertTo("far.splats", 10, {128, 64, 64});
+  convertTo("far.splats", 10, {40, 24, 24});
   FrameOptions options = knownFrame(kSize);
   const auto sceneWith = [](double isovalue) {
     auto scene = std::make_shared<SurfaceScene>();
@@ -339,7 +346,7 @@ TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
   };
   options.scene = sceneWith(0.6);
   const TransferFunction opacity = KnownFunction::of("smooth").table;
-  const Image near = drawn(opacity, options);
+  const Image near = drawn(opacity, options, Backend::kCpu, "small.splats");
   options.scene = sceneWith(10.6);
   const CacheReader cache(*folder_ / "far.splats");
   const TransferFunction far_hues = TransferFunction::preset("cool-warm", 10, 11, 1);

@@ -29,7 +29,7 @@ namespace curvisplat {
 class WindowTest : public ProgramSuite<WindowTest> {
  protected:
   using Place = std::pair<int, int>;
-  static constexpr ImageSize kScreen{1000, 700}, kWindow{900, 600};
+  static constexpr ImageSize kScreen{1000, 700}, kWindow{740, 600};
 
   static void prepare() {
     old_folder_ = std::filesystem::current_path();

@@ -62,6 +62,7 @@ class WindowPanels : public WindowTest {
 TEST_F(WindowPanels, TheValueUnderTheMouseIsThatOfTheData) {
   open();
   save();
+  moveTo(placeOf("picture"));
   const std::string status = widget("status f ");
   std::smatch parts;
   ASSERT_TRUE(std::regex_search(
@@ -85,6 +86,7 @@ TEST_F(WindowPanels, TheValueUnderTheMouseIsThatOfTheData) {
 TEST_F(WindowPanels, AClickKeepsAMarkerWhichIsRenamedUndoneAndRemoved) {
   open();
   save();
+  moveTo(placeOf("picture"));
   widget("status f ");
   click(placeOf("picture"));
   widget("message marker 1: f ");
@@ -237,7 +239,7 @@ TEST_F(WindowPanels, GripsHaveADarkAndALightRing) {
 
 /// The name of an axis in the picture is pressed: the view is that of the key, and then that from the other side.
 TEST_F(WindowPanels, AxesAreLookedAlongByAClick) {
-  open();
+  open({}, {900, 600});
   press("y");
   const Image by_key = save();
   const Place along = placeOf("axis y");

@@ -89,20 +89,14 @@ TEST_F(WindowTest, ShowsPicturesOfTheCardWithoutReadingThem) {
   const auto is_final = [] { return hasWidget("state final"); };
   ASSERT_TRUE(eventually(is_final, 400));
   EXPECT_TRUE(hasWidget("read back 0"));
-  // What is on the screen before the picture was ever read is what is saved.
-  const Image before = shown(pictureSize());
-  const Image first = save();
-  EXPECT_GT(difference(before, first), 45);
-  EXPECT_FALSE(hasWidget("read back 0"));
-  close();
-
-  open({"--backend", "egl"});
-  ASSERT_TRUE(eventually(is_final, 400));
+  const Image first = shown(pictureSize());
   for (const double across : {0.2, -0.1, 0.15}) dragPicture(1, across, 0.1);
   ASSERT_TRUE(eventually([&] { return difference(shown(first.size), first) < 30 && is_final(); }));
   EXPECT_TRUE(hasWidget("read back 0"));
+  // What is on the screen before a picture was ever read is what is saved.
   const Image moved = shown(first.size), rotated = save();
   EXPECT_GT(difference(moved, rotated), 45);
+  EXPECT_FALSE(hasWidget("read back 0"));
   close();
 }
 

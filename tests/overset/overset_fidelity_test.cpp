@@ -63,6 +63,7 @@ TEST_F(OversetFidelity, TwoThreeAndSixBlocksLookLikeOne) {
   }
   for (const uint64_t nodes : {24u})
     for (const size_t boxes : {1u, 2u, 5u}) {
+      if (boxes == 2 && !faults::isWholeSweep()) continue;
       const FunctionGridSource source = oversetGrid(scene_, block, boxesInHalfAnnulus(boxes, nodes));
       const std::string name = fmt::format("{}_of_{}.splats", boxes + 1, nodes);
       const ConvertReport report = convertTo(name, source, Overlap::kOwner);

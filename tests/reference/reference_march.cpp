@@ -348,7 +348,9 @@ void marchPixels(const March& march, const std::vector<uint8_t>& wanted, Referen
     for (int x = 0; x < size.width; ++x) {
       const size_t p = static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x);
       if (!wanted[p]) continue;
-      const Ray ray = rayThrough(camera, size, x, y);
+      const int every = steps.every;
+      const Ray ray = rayThrough(camera, {every * size.width, every * size.height}, every * x + every / 2,
+                                 every * y + every / 2);
       const auto part = partInBox(ray, lower, upper);
       const bool from_eye = camera.projection == Projection::kPerspective;
       const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
@@ -372,6 +374,11 @@ std::vector<uint8_t> unsettled(const ReferenceImage& a, const ReferenceImage& b,
           out[static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u)] = 1;
     }
   return out;
+}
+
+ReferenceImage emptyImage(ImageSize picture, const MarchSteps& steps) {
+  const ImageSize size{picture.width / steps.every, picture.height / steps.every};
+  return {size, std::vector<ReferencePixel>(size.pixels())};
 }
 
 glm::dvec3 sectionNineColour(double f) {
@@ -496,22 +503,22 @@ OpticalProperties stepFunction(double scalar) {
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
                               const ReferenceExtras& extras) {
-  ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
+  ReferenceImage image = emptyImage(size, steps);
   marchPixels(
       {field,
        function,
        camera,
        steps,
        {extras.light, extras.layers, nullptr, extras.gradient_opacity ? &extras.gradient_opacity : nullptr}},
-      std::vector<uint8_t>(size.pixels(), 1), image);
+      std::vector<uint8_t>(image.pixels.size(), 1), image);
   return image;
 }
 
 ReferenceImage referenceMarch(const ReferenceField& field, const TwoScalars& scalars, const Camera& camera,
                               ImageSize size, const MarchSteps& steps, const ReferenceLayers& layers) {
-  ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
+  ReferenceImage image = emptyImage(size, steps);
   marchPixels({field, scalars.function, camera, steps, {nullptr, layers, &scalars.colour}},
-              std::vector<uint8_t>(size.pixels(), 1), image);
+              std::vector<uint8_t>(image.pixels.size(), 1), image);
   return image;
 }
 
@@ -568,6 +575,15 @@ Image toImage(const ReferenceImage& reference) {
     image.rgba[4 * n + 3] = 1;
   }
   return image;
+}
+
+ImageDifference compareWithReference(const Image& picture, const Image& reference) {
+  const int every = picture.size.width / reference.size.width;
+  Image marched(reference.size);
+  for (int y = 0; y < marched.size.height; ++y)
+    for (int x = 0; x < marched.size.width; ++x)
+      std::copy_n(picture.pixel(every * x + every / 2, every * y + every / 2), 4, marched.pixel(x, y));
+  return compareImages(marched, reference);
 }
 
 Camera halfAnnulusCamera() {

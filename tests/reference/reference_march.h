@@ -50,6 +50,7 @@ struct MarchSteps {
   double step = 0.004;  // world units
   double cells = 0.5;   // of a grid's cell, at the point where a step begins
   double near = 0;      // perspective: as ScreenView::near
+  int every = 1;  // only one pixel of so many along x and along y is marched: the image is so much smaller
   // A step is halved until its optical depth, and the light from it, are within this of the midpoint rule's.
   // But at jumps, Simpson's rule is far nearer to the truth.
   double tolerance = 1e-5;
@@ -138,6 +139,9 @@ ConvergedImage convergedMarch(const ReferenceField& field, const OpticalFunction
 
 /// The picture over white.
 Image toImage(const ReferenceImage& reference);
+
+/// How a picture differs from a reference, which may be of some of its pixels (MarchSteps::every).
+ImageDifference compareWithReference(const Image& picture, const Image& reference);
 
 /// The camera of DESIGN.md, "Fidelity": orthographic, on the half-annulus.
 Camera halfAnnulusCamera();

@@ -314,7 +314,7 @@ TEST_F(WindowPlayback, FacesMoveWithTheGrid) {
          << points << "</DataArray></Points></Piece></StructuredGrid></VTKFile>\n";
   }
   run({"convert", "m_%d.vts", "-o", "a.splats", "--overwrite"});
-  open({"--surface", "kmax", "--surface-colour", "#306090", "--volume", "off"});
+  open({"--surface", "kmax", "--surface-colour", "#306090", "--volume", "off"}, {900, 600});
   const Image first = saveAndCopy();
   press("period");
   const Image second = saveAndCopy();

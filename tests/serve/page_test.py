@@ -5,6 +5,7 @@
 """
 import base64
 import json
+import os
 import pathlib
 import shlex
 import subprocess
@@ -36,12 +37,20 @@ def shot(tab, name):
         tab.screenshot(shots / f"{name}.png")
 
 
+# The sum of the final picture's pixels, taken once a picture; null until it is there.
+SUM = f"""(() => {{ if (!({FINAL})) return null;
+  const drawn = {PAGE}.pictures;
+  if (!window.summed || summed[0] !== drawn) {{
+    const c = document.getElementById('picture'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let h = 0;
+    for (let n = 0; n < d.length; ++n) h = (h * 31 + d[n]) >>> 0;
+    window.summed = [drawn, h];
+  }}
+  return summed; }})()"""
+
+
 def rest(tab):
     """Waits until the picture of the page's last request is lossless, and returns its pixels' sum."""
-    tab.wait(FINAL, "a final picture")
-    return tab.run("""(() => { const c = document.getElementById('picture');
-      const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let h = 0;
-      for (let n = 0; n < d.length; ++n) h = (h * 31 + d[n]) >>> 0; return h; })()""")
+    return tab.wait(SUM, "a final picture")[1]
 
 
 def changes(tab, act, what, name=None):
@@ -214,6 +223,7 @@ def press(tab, selector):
 def objects(tab):
     """Faces and isosurfaces are added, hidden, moved and removed."""
     before = rest(tab)
+    tab.run("keepAddress()")
     kept = tab.run("[statesAtRest.length, location.hash, JSON.stringify(state)]")
     press(tab, "#add-face")
     expect(tab.run("[...document.querySelectorAll('#face-names button')].map(o => o.textContent).includes('jmin')"), "the grid's faces are offered")
@@ -422,7 +432,7 @@ def sizes(tab):
     rest(tab)
     first = tab.run(f"{PAGE}.state.camera.parallel_scale")
     widths = []
-    for width, height, ratio in ((640, 480, 1), (390, 844, 2), (1920, 1080, 1), (1280, 800, RATIO)):
+    for width, height, ratio in ((640, 480, 1), (390, 844, 2), (1920, 1080, RATIO), (1280, 800, RATIO)):
         tab.resize(width, height, ratio)
         time.sleep(0.3)
         rest(tab)
@@ -640,6 +650,7 @@ def shared_address(browser, server, tab):
     # In a page that is open, an address typed over the other one is shown, too.
     tab.run("document.getElementById('fit').click()")
     wait_for(lambda: rest(tab) != before, "another view")
+    tab.run("keepAddress()")  # which is made after the picture
     other.run(f"location.hash = {tab.run('location.hash')!r}")
     wait_for(lambda: rest(other) == rest(tab), "the page to follow its address")
     # One that was cut off says so.
@@ -799,12 +810,6 @@ def phone(browser, server):
     shot(tab, "phone_keys")
     tab.run("document.getElementById('keys').close()")
     # Its whole label switches a box.
-    tab.run("document.getElementById('keys').showModal()")
-    wide_columns = tab.run("""[...document.querySelectorAll('#keys td')].map(e => e.getBoundingClientRect().width)
-      .every(width => width > 0.3 * document.getElementById('keys').clientWidth)""")
-    expect(wide_columns, "keys and what they do both have space")
-    shot(tab, "phone_keys")
-    tab.run("document.getElementById('keys').close()")
     before = tab.run("document.getElementById('outline').checked")
     tab.run("document.getElementById('outline').closest('label').click()")
     expect(tab.run("document.getElementById('outline').checked") != before, "a label switches its box")
@@ -823,23 +828,26 @@ def wrong_token(browser, server):
     expect(refused == "refused", f"another page's socket: {refused}")
 
 
-def ten_clients(browser, caches):
-    with serving(program, caches, "--viewer-memory", "128M", "--memory", "1280M") as server:
-        tabs = [browser.tab(server.url, (480, 360)) for _ in range(10)]  # each in a window: hidden pages ask for nothing
+def as_many_clients_as_may_be(browser, caches):
+    clients = 10 if "CURVISPLAT_WHOLE" in os.environ else 3
+    with serving(program, caches, "--viewer-memory", "128M", "--memory", f"{128 * clients}M") as server:
+        tabs = [browser.tab(server.url, (480, 360)) for _ in range(clients)]  # each in a window: hidden pages ask for nothing
         for n, tab in enumerate(tabs):
             tab.wait(f"{PAGE} && {PAGE}.pictures > 0", f"client {n}'s picture")
-        tab_11 = browser.tab(server.url, (480, 360))
-        tab_11.wait("document.getElementById('status') && document.getElementById('status').textContent.includes('as many viewers')", "the eleventh to be told")
-        shot(tab_11, "eleventh")
+        refused = browser.tab(server.url, (480, 360))
+        refused.wait("document.getElementById('status') && document.getElementById('status').textContent.includes('as many viewers')", "one more to be told")
+        shot(refused, "refused")
         for n, tab in enumerate(tabs):
             tab.run(f"{PAGE}.state.camera.parallel_scale *= {1 + 0.05 * n}; window.dispatchEvent(new Event('nothing'))")
             tab.drag((390, 150), (420 + 2 * n, 160), steps=4)
         sums = {rest(tab) for tab in tabs}
-        expect(len(sums) == 10, f"ten clients have ten views: {len(sums)}")
-        print(f"ten clients: {server.kilobytes()} kB, {server.threads()} threads")
-        for tab in tabs + [tab_11]:
+        expect(len(sums) == clients, f"{clients} clients have as many views: {len(sums)}")
+        threads = server.threads()
+        print(f"{clients} clients: {server.kilobytes()} kB, {threads} threads")
+        for tab in tabs + [refused]:
             tab.call("Page.navigate", url="about:blank")
-        wait_for(lambda: server.threads() < 12, "the viewers to end")
+        wait_for(lambda: server.threads() <= threads - clients, "the viewers to end")
+        print(f"without clients: {server.threads()} threads")
 
 
 def thumbnails(browser, caches):
@@ -886,7 +894,7 @@ def page_without_server(browser, folder):
 
 
 with tempfile.TemporaryDirectory() as folder:
-    subprocess.run([program, "generate", "half-annulus", "--size", "48x32x24", "-o", f"{folder}/g"], check=True, capture_output=True)
+    subprocess.run([program, "generate", "half-annulus", "--size", "36x24x18", "-o", f"{folder}/g"], check=True, capture_output=True)
     subprocess.run([program, "convert", f"{folder}/g.xyz", f"{folder}/g.fun", "-o", f"{folder}/annulus.splats"], check=True, capture_output=True)
     subprocess.run([program, "generate", "wake", "--size", "32x24x16", "--steps", "4", "-o", f"{folder}/w"], check=True, capture_output=True)
     subprocess.run([program, "convert", f"{folder}/w.xyz", f"{folder}/w_*.fun", "-o", f"{folder}/wake.splats"], check=True, capture_output=True)
@@ -938,7 +946,7 @@ with tempfile.TemporaryDirectory() as folder:
             print("two scalars done")
         lost_connection(browser, caches, folder)
         print("lost connection done")
-        ten_clients(browser, caches)
+        as_many_clients_as_may_be(browser, caches)
         thumbnails(browser, caches)
         print("thumbnails done")
         page_without_server(browser, folder)
