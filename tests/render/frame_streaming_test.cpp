@@ -30,7 +30,7 @@ using Way = PagerOptions::Way;
 class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
  protected:
   FrameStreamingTest() {
-    writeRandomCache(path(), 3);
+    writeRandomCache(path(), 3, GetParam() == Backend::kOsmesa ? 1000 : 3000);
     cache_ = std::make_unique<CacheReader>(path());
   }
 
