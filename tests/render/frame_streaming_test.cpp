@@ -157,7 +157,7 @@ TEST_P(FrameStreamingTest, CanBeStoppedAtAnyMoment) {
   wanted.threads = 3;
   const Image expected = renderer.render(camera("iso"), wanted, statistics);
 
-  const int rounds = faults::isWholeSweep() ? 1000 : GetParam() == Backend::kCpu ? 250 : 100;
+  const int rounds = faults::isWholeSweep() ? 1000 : GetParam() == Backend::kCpu ? 120 : 50;
   std::vector<std::stop_source> stops(static_cast<size_t>(rounds));
   std::atomic<int> round = -1, ended = -1;
   std::thread stopper([&] {
