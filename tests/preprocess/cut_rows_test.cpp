@@ -128,7 +128,7 @@ TEST_F(CutRows, OfCellsGiveTheBytesOfWholeRows) {
 TEST_F(CutRows, OfOverlappingBlocksGiveTheBytesOfWholeRows) {
   for (const Centring centring : {Centring::kNode, Centring::kCell})
     expectSameBytes(
-        oversetGrid(makeScene("half-annulus"), gridBlock(400, 8, 8), boxesInHalfAnnulus(3, 12), centring),
+        oversetGrid(makeScene("half-annulus"), gridBlock(300, 8, 8), boxesInHalfAnnulus(3, 9), centring),
         {3000}, 1);
 }
 
@@ -189,9 +189,8 @@ TEST_F(CutRows, HaveTheChecksumOfWholeRows) {
     return sum.value();
   };
   const uint64_t whole = checksum(1 << 20, kNoHalo);
-  for (const uint64_t window : {1u, 7u, 50u, 89u}) EXPECT_EQ(checksum(window, kNoHalo), whole) << window;
-  for (const uint64_t window : {1200u, 1500u, 6000u})
-    EXPECT_EQ(checksum(window, kNodeSplatHalo), whole) << window;
+  for (const uint64_t window : {1u, 50u, 89u}) EXPECT_EQ(checksum(window, kNoHalo), whole) << window;
+  for (const uint64_t window : {1200u, 6000u}) EXPECT_EQ(checksum(window, kNodeSplatHalo), whole) << window;
   // A share of slabs has whole rows.
   for (const unsigned count : {2u, 3u, 7u}) {
     uint64_t sum = 0;
