@@ -39,7 +39,8 @@ class Form:
 
 class SmokeForm(Form):
     micro = ["--benchmark_min_time=0.000001", 
-             "--benchmark_filter=-plainReader|pager|osmesa/radius:([248]/|16/kind:[12])|cpu/radius:[24]/|chooseRegions/million:30|openIndex"]
+             "--benchmark_filter=-plainReader|pager|osmesa/radius:([248]/|16/kind:[12])|cpu/radius:[248]/|radius:16/kind:2|chooseRegions/million:3$|"
+             "openIndex|lines:1000|side:(256|1024)|blank_every:1001|perspective:1/million"]
     bench = ["--size", "64x64", "--lod-pixels", "2"]
     micro_cache = True  # they use the cache of the step "bench"
     cache = "32x32x32"

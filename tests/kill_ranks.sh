@@ -4,13 +4,13 @@
 #
 #   tests/kill_ranks.sh [PROGRAM [SIZE [KILLS [FOLDER]]]]
 #
-# KILLS are those of each pass (1), at moments spread over it. SIZE is the generated grid's (64x48x40), FOLDER has room for 250
+# KILLS are those of each pass (1), at moments spread over it. SIZE is the generated grid's (47x40x36: several bricks), FOLDER has room for 250
 # bytes a node. With CURVISPLAT_WHOLE (tools/test.sh --whole) 20 and 160x120x100: 2 M nodes. dying_ranks lies beside PROGRAM.
 set -euo pipefail
 
 program=$(realpath "${1:-build/release/tools/curvisplat}")
 dying=$(dirname "$program")/dying_ranks
-usual=(64x48x40 1)
+usual=(47x40x36 1)
 [[ ! -v CURVISPLAT_WHOLE ]] || usual=(160x120x100 20)
 size=${2:-${usual[0]}}
 kills=${3:-${usual[1]}}
@@ -26,7 +26,7 @@ cache=$folder/work/a.splats
 log=$folder/log
 statistics=$folder/stats.json
 grid=("$folder/in.xyz" "$folder/in.fun")
-convert=(convert "${grid[@]}" -o "$cache" --threads 1 --memory 256M)
+convert=(convert "${grid[@]}" -o "$cache" --threads 1 --memory 256M --refine 1)  # cells whole, as dying_ranks has them
 mpirun=(mpirun --oversubscribe --allow-run-as-root --bind-to none -q)
 
 mkdir "$folder/work"

@@ -39,7 +39,7 @@ class Additions:
         self.work = folder / "work"
         self.cache = self.work / "a.splats"
         run(program, "generate", "wake", "--size", size, "-o", folder / "in")
-        run(program, "convert", *self.grid, "-o", folder / "before.splats")
+        run(program, "convert", *self.grid, "--refine", "1", "-o", folder / "before.splats")  # as dying_ranks
         self.before = digests(folder / "before.splats")
         self.prepare()
         self.add()
@@ -88,7 +88,7 @@ class Additions:
         return killed, victim, faults
 
 
-def main(program, kills=USUAL_KILLS, size="64x48x40"):
+def main(program, kills=USUAL_KILLS, size="47x40x36"):
     program = pathlib.Path(program).resolve()
     if not shutil.which("mpirun") or not (program.parent / "curvisplat-mpi.so").exists():
         print("skipped: no mpirun (Debian: openmpi-bin), or built without MPI")

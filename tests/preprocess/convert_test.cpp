@@ -94,9 +94,9 @@ FunctionGridSource bentBoxSource(uint64_t ni, uint64_t nj, uint64_t nk, size_t s
 
 TEST(Convert, KeepsEveryNodeAndItsVolume) {
   const TemporaryFolder folder;
-  const SceneGridSource source(makeScene("half-annulus"), {96, 48, 48});
+  const SceneGridSource source(makeScene("half-annulus"), {60, 36, 36});
   const ConvertReport report = converted(source, optionsFor(source, folder / "a.splats"));
-  EXPECT_EQ(report.nodes, 96u * 48 * 48);
+  EXPECT_EQ(report.nodes, 60u * 36 * 36);
   EXPECT_EQ(report.splats, report.nodes);
   EXPECT_EQ(report.merged_nodes, 0u);
   checkCache(folder / "a.splats", report.nodes);
@@ -109,7 +109,7 @@ TEST(Convert, KeepsEveryNodeAndItsVolume) {
 
 TEST(Convert, GivesTheSameBytesForAnyThreadsAndMemory) {
   const TemporaryFolder folder;
-  const SceneGridSource source(makeScene("wake"), {80, 70, 40});
+  const SceneGridSource source(makeScene("wake"), {60, 40, 32});
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.title = "the same";
   options.threads = 2;
@@ -118,9 +118,9 @@ TEST(Convert, GivesTheSameBytesForAnyThreadsAndMemory) {
   const ConvertReport report = expectSameCaches(source, options,
                                                 {{.threads = 1},
                                                  {.threads = 1, .memory_bytes = least},
-                                                 {.memory_bytes = least, .bucket_splats = 80000},
-                                                 {.memory_bytes = least, .bucket_splats = 20000},
-                                                 {.memory_bytes = least, .bucket_splats = 500}});
+                                                 {.memory_bytes = least, .bucket_splats = 30000},
+                                                 {.memory_bytes = least, .bucket_splats = 7000},
+                                                 {.memory_bytes = least, .bucket_splats = 200}});
   EXPECT_GT(report.merged_nodes, 0u);  // the O-grid closes on itself
   checkCache(options.output, report.nodes - report.merged_nodes);
 }
@@ -128,36 +128,36 @@ TEST(Convert, GivesTheSameBytesForAnyThreadsAndMemory) {
 TEST(Convert, DividesBucketsThatThePlanLeftTooLarge) {
   // A cluster finer than the counting grid can see, in the midst of an even grid.
   const TemporaryFolder folder;
-  const GridBlock block = gridBlock(60, 60, 60);
+  const GridBlock block = gridBlock(44, 44, 44);
   const FunctionGridSource source({block}, 1, [&](const GridNode& node) {
     NodeValues values = bentBox(node, block);
-    if (node.k > 20) values.position = glm::dvec3(0.3) + 1e-6 * values.position;
+    if (node.k > 15) values.position = glm::dvec3(0.3) + 1e-6 * values.position;
     return values;
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
-  const ConvertReport report = expectSameCaches(source, options, {{.bucket_splats = 3000}});
+  const ConvertReport report = expectSameCaches(source, options, {{.bucket_splats = 1200}});
   checkCache(options.output, report.splats);
 }
 
 TEST(Convert, TakesNodesThatAllCoincide) {
   const TemporaryFolder folder;
-  const FunctionGridSource source({gridBlock(60, 60, 60)}, 1, [](const GridNode& node) {
+  const FunctionGridSource source({gridBlock(43, 43, 43)}, 1, [](const GridNode& node) {
     return NodeValues{glm::dvec3(1, 2, 3), {static_cast<float>(node.i)}, false};
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
-  const ConvertReport report = expectSameCaches(source, options, {{.bucket_splats = 10000}});
+  const ConvertReport report = expectSameCaches(source, options, {{.bucket_splats = 5000}});
   checkCache(options.output, report.splats);
-  EXPECT_GT(report.splats, 2 * 65536u);
+  EXPECT_GT(report.splats, 65536u);
   EXPECT_EQ(report.levels, 1u);
   EXPECT_EQ(report.bricks, (report.splats + 65535) / 65536);
 }
 
 TEST(Convert, TakesAClusterOfCoincidentNodesInAGrid) {
   const TemporaryFolder folder;
-  const GridBlock block = gridBlock(70, 50, 60);
+  const GridBlock block = gridBlock(50, 44, 44);
   const FunctionGridSource source({block}, 1, [&](const GridNode& node) {
     NodeValues values = bentBox(node, block);
-    if (node.k >= 10 && node.k < 40) values.position = glm::dvec3(0.5);
+    if (node.k >= 5 && node.k < 40) values.position = glm::dvec3(0.5);
     return values;
   });
   ConvertOptions options = optionsFor(source, folder / "a.splats");
@@ -197,9 +197,9 @@ TEST(Convert, TakesManySmallBlocks) {
 
 TEST(Convert, TakesExtremeAspectRatios) {
   const TemporaryFolder folder;
-  const FunctionGridSource source = bentBoxSource(50, 50, 50, 1, 1e-5);
+  const FunctionGridSource source = bentBoxSource(42, 42, 42, 1, 1e-5);
   const ConvertReport report = converted(source, optionsFor(source, folder / "a.splats"));
-  checkCache(folder / "a.splats", 125000);
+  checkCache(folder / "a.splats", 42 * 42 * 42);
   EXPECT_EQ(report.degenerate, 0u);
   EXPECT_NEAR(report.volume, 1e-5, 1e-7);
 }
@@ -249,10 +249,10 @@ TEST(Convert, RefusesAGridWithNothingToDraw) {
 
 TEST(Convert, KeepsSeveralScalarsApart) {
   const TemporaryFolder folder;
-  const FunctionGridSource source = bentBoxSource(50, 40, 45, 2);
+  const FunctionGridSource source = bentBoxSource(44, 40, 40, 2);
   ConvertOptions options = optionsFor(source, folder / "both.splats");
   converted(source, options);
-  checkCache(options.output, 90000);
+  checkCache(options.output, 44 * 40 * 40);
   options.output = folder / "second.splats";
   options.scalars = {1};
   converted(source, options);
@@ -288,10 +288,10 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   converted(before_source, optionsFor(before_source, folder / "a.splats"));
   const auto before = allFilesOf(folder / "a.splats");
 
-  const FunctionGridSource source = bentBoxSource(44, 44, 44);
+  const FunctionGridSource source = bentBoxSource(24, 24, 24);
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.overwrite = true;
-  options.limits.bucket_splats = 20000;
+  options.limits.bucket_splats = 3000;
   faults::FaultySystemCalls disk;
   {
     const ScopedSystemCalls scope(disk);

@@ -17,6 +17,7 @@
 #include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/grid_nodes.h"
 #include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
@@ -109,11 +110,11 @@ FunctionGridSource blocksWithSeams(Centring centring) {
 }
 
 TEST_F(CutRows, OfAThinGridGiveTheBytesOfWholeRows) {
-  expectSameBytes(tube(3000, 2 + 4, 2), {900, 2000, 10001});
+  expectSameBytes(tube(1200, 2 + 4, 2), {400, 801, 4000});
 }
 
 TEST_F(CutRows, OfAPeriodicGridGiveTheBytesOfWholeRows) {
-  expectSameBytes(SceneGridSource(makeScene("wake"), {150, 30, 20}), {4001});
+  expectSameBytes(SceneGridSource(makeScene("wake"), {120, 20, 14}), {2001});
 }
 
 TEST_F(CutRows, OfBlocksWithSeamsAndBlanksGiveTheBytesOfWholeRows) {
@@ -127,7 +128,7 @@ TEST_F(CutRows, OfCellsGiveTheBytesOfWholeRows) {
 TEST_F(CutRows, OfOverlappingBlocksGiveTheBytesOfWholeRows) {
   for (const Centring centring : {Centring::kNode, Centring::kCell})
     expectSameBytes(
-        oversetGrid(makeScene("half-annulus"), gridBlock(400, 8, 8), boxesInHalfAnnulus(3, 12), centring),
+        oversetGrid(makeScene("half-annulus"), gridBlock(300, 8, 8), boxesInHalfAnnulus(3, 9), centring),
         {3000}, 1);
 }
 
@@ -135,15 +136,17 @@ TEST_F(CutRows, AreSharedByRanks) {
   for (const Centring centring : {Centring::kNode, Centring::kCell}) {
     const FunctionGridSource source = blocksWithSeams(centring);
     const uint64_t slab_bytes = bytesFor(1500, 2);
-    expectSameCaches(source, optionsFor("ranks.splats", source),
-                     {{.threads = 1, .slab_bytes = slab_bytes, .ranks = 2},
-                      {.threads = 1, .slab_bytes = slab_bytes, .ranks = 5}});
+    for (const unsigned ranks : {5u, 2u})
+      if (ranks == 5 || faults::isWholeSweep())
+        expectSameCaches(source, optionsFor("ranks.splats", source),
+                         {{.threads = 1, .slab_bytes = slab_bytes, .ranks = ranks}});
   }
 }
 
 TEST_F(CutRows, TakeAFurtherScalarAsWholeOnesDo) {
   for (const Centring centring : {Centring::kNode, Centring::kCell})
     for (const bool blanks : {false, true}) {  // of the older scalar, which the cache alone knows
+      if (blanks != (centring == Centring::kNode) && !faults::isWholeSweep()) continue;
       const FunctionGridSource source = blocksWithSeams(centring);
       ConvertOptions options = optionsFor("first.splats", source);
       options.scalars = {0};
@@ -186,9 +189,8 @@ TEST_F(CutRows, HaveTheChecksumOfWholeRows) {
     return sum.value();
   };
   const uint64_t whole = checksum(1 << 20, kNoHalo);
-  for (const uint64_t window : {1u, 7u, 50u, 89u}) EXPECT_EQ(checksum(window, kNoHalo), whole) << window;
-  for (const uint64_t window : {1200u, 1500u, 6000u})
-    EXPECT_EQ(checksum(window, kNodeSplatHalo), whole) << window;
+  for (const uint64_t window : {1u, 50u, 89u}) EXPECT_EQ(checksum(window, kNoHalo), whole) << window;
+  for (const uint64_t window : {1200u, 6000u}) EXPECT_EQ(checksum(window, kNodeSplatHalo), whole) << window;
   // A share of slabs has whole rows.
   for (const unsigned count : {2u, 3u, 7u}) {
     uint64_t sum = 0;

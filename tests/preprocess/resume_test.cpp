@@ -65,7 +65,7 @@ class Resume : public ::testing::Test {
   };
 
   Resume() : unsynced_(calls_) {
-    if (!wake_) wake_ = made(SceneGridSource(makeScene("wake"), {50, 40, 36}));
+    if (!wake_) wake_ = made(SceneGridSource(makeScene("wake"), {47, 40, 36}));
     use(*wake_);
   }
   static void TearDownTestSuite() { wake_.reset(); }
@@ -198,7 +198,7 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
   const std::optional<uint64_t> bucket_splats[] = {kBucketSplats, std::nullopt, 3000};
   int resumed = 0;
   int64_t call = 0;
-  for (; !killedAt(call); call = faults::nextInSweep(call, 11)) {
+  for (; !killedAt(call); call += faults::isWholeSweep() ? 1 : call < 12 ? 3 : 19) {
     SCOPED_TRACE(call);
     expectUnfinishedOrWhole(partial());
     expectUnfinishedOrWhole(output_);
@@ -234,7 +234,7 @@ TEST_F(Resume, ContinuesOrDropsTheBricksOfALargeCell) {
 
 /// A cell of several bricks, which no division parts.
 TEST_F(Resume, TakesNodesThatAllCoincide) {
-  setUp(FunctionGridSource({gridBlock(50, 50, 60)}, 1, [](const GridNode& node) {
+  setUp(FunctionGridSource({gridBlock(50, 50, 33)}, 1, [](const GridNode& node) {
     return NodeValues{glm::dvec3(1, 2, 3), {static_cast<float>(node.i)}, false};
   }));
   const int64_t calls = callsOfAll({"writes"});
@@ -249,7 +249,7 @@ TEST_F(Resume, TakesNodesThatAllCoincide) {
     if (HasFailure()) return;
     fs::remove_all(output_);
   }
-  EXPECT_EQ(most, 3u);
+  EXPECT_EQ(most, 2u);
 }
 
 TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
@@ -264,7 +264,7 @@ TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
   for (int64_t call = calls / 8; call <= calls + kCallsToRemove; call += call < calls - kCallsToFinish
                                                                              ? calls / 4
                                                                          : faults::isWholeSweep() ? 1
-                                                                                                  : 3) {
+                                                                                                  : 6) {
     SCOPED_TRACE(call);
     fs::remove_all(output_);
     fs::copy(folder_ / "old.splats", output_);
@@ -352,7 +352,9 @@ TEST_F(Resume, RebuildsWhatTheDiskHasLost) {
   const fs::path temporary = scratch(), killed = folder_ / "killed";
   ASSERT_EQ(temporary.parent_path(), work_);
   fs::copy(work_, killed, fs::copy_options::recursive);
-  for (const auto& [what, lose] : losses) {
+  for (size_t n = 0; n < std::size(losses); ++n) {
+    if (!faults::isTried(n, 2)) continue;  // of each file something
+    const auto& [what, lose] = losses[n];
     SCOPED_TRACE(what);
     fs::remove_all(work_);
     fs::copy(killed, work_, fs::copy_options::recursive);
@@ -370,14 +372,14 @@ TEST_F(Resume, ReportsFinishedWork) {
   const ConvertReport report = convert(*source_, optionsFor({true, false, std::nullopt}), progress);
   EXPECT_TRUE(report.resumed);
   EXPECT_EQ(report.resumed_bricks, done);
-  EXPECT_EQ(report.nodes, 72000u);
+  EXPECT_EQ(report.nodes, 47u * 40 * 36);
   EXPECT_GT(report.merged_nodes, 0u);
-  EXPECT_GT(report.temporary_bytes, 61u * 70000);
+  EXPECT_GT(report.temporary_bytes, 61u * 65536);
   // The grid is not read again.
   std::vector<std::string> phases;
   for (const Progress::Phase& phase : progress.phases()) phases.push_back(phase.name);
   EXPECT_EQ(phases, (std::vector<std::string>{"check", "build", "finish"}));
-  EXPECT_LT(progress.phases()[1].steps, 70000u);
+  EXPECT_LT(progress.phases()[1].steps, 65536u);
   EXPECT_GT(progress.phases()[1].steps, 0u);
 }
 
@@ -424,7 +426,7 @@ TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
     fs::remove_all(output_);
   }
   int left = 0, removed = 0;
-  for (int64_t at = 0; at < counting.writes - 12; at += faults::isWholeSweep() ? 5 : 11) {
+  for (int64_t at = 0; at < counting.writes - 12; at += faults::isWholeSweep() ? 5 : 17) {
     SCOPED_TRACE(at);
     Progress progress;
     {
@@ -447,13 +449,13 @@ TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
 }
 
 TEST_F(Resume, RepeatsTheWarningOfLostValues) {
-  setUp(FunctionGridSource({gridBlock(60, 40, 30)}, 2, [](const GridNode& n) {
+  setUp(FunctionGridSource({gridBlock(30, 20, 20)}, 2, [](const GridNode& n) {
     const float value = n.i < 3 ? std::numeric_limits<float>::quiet_NaN() : 1;
     return NodeValues{{n.i, n.j, n.k}, {static_cast<float>(n.i), value}};
   }));
   const auto convertBoth = [&](bool resume, int64_t fail_write_at) {
     Progress progress;
-    ConvertOptions options = optionsFor({resume, false, kBucketSplats});
+    ConvertOptions options = optionsFor({resume, false, 1500});
     options.scalars = {0, 1};
     faults::FaultySystemCalls full;
     full.fail_write_at = fail_write_at;

@@ -471,6 +471,7 @@ void appendMeetings(const ReferenceIsosurface& surface, const Ray& line,
     }
     found.push_back(
         {low, litAtViewer(surface.colour, glm::normalize(gradient), line.direction), surface.opacity(at)});
+    if (found.back().opacity >= 1) return;  // hides what lies behind it
   }
 }
 
@@ -480,7 +481,10 @@ ReferenceLayers isoLayer(const Scene& scene, const ReferenceIsosurface& surface)
   return [field = SceneField(scene), surface](const glm::dvec3& origin, const glm::dvec3& direction) {
     const Ray line{origin, direction};
     std::vector<ReferenceLayer> found;
-    for (const auto& part : partsInside(field, line)) appendMeetings(surface, line, part, found);
+    for (const auto& part : partsInside(field, line)) {
+      appendMeetings(surface, line, part, found);
+      if (!found.empty() && found.back().opacity >= 1) break;
+    }
     return found;
   };
 }

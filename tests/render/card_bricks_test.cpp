@@ -30,6 +30,7 @@
 #include "stream/base/progress.h"
 #include "stream/model/border_code.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_caches.h"
 #include "tests/support/thread_ranks.h"
@@ -182,11 +183,15 @@ TEST_P(CardBricksWith, AreCutAndClassifiedAsByTheProcessor) {
          steep(o);
        }}};
   const Camera parallel = camera("iso"), eye = camera("iso", Projection::kPerspective);
+  const bool is_whole = kind == "nodes" || faults::isWholeSweep();  // else shadows with all the others alone
   for (const Addition& addition : additions) {
+    if (!is_whole && std::string_view(addition.name) == "shadows") continue;
     const std::string what = fmt::format("{}, {}", kind, addition.name);
     EXPECT_EQ(compare(what, kind == "nodes" ? eye : parallel, addition.set), read_) << what;
   }
-  EXPECT_EQ(compare(kind + ", all", kind == "nodes" ? parallel : eye, additions[4].set), read_);
+  if (is_whole) {
+    EXPECT_EQ(compare(kind + ", all", kind == "nodes" ? parallel : eye, additions[4].set), read_);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(, CardBricksWith, ::testing::Values("nodes", "cells", "two scalars"),
@@ -280,7 +285,7 @@ TEST_F(CardBricksTest, GiveTheSameBitsForAnyHistoryThreadsAndMemory) {
       FrameOptions wanted = options(card_memory);
       wanted.threads = threads;
       wanted.memory_bytes = (threads == 1 ? 96 : 512) * kMiB;
-      for (const char* view : {"+z", "-x"}) fresh->render(camera(view), wanted, statistics);
+      fresh->render(camera(threads == 1 ? "+z" : "-x"), wanted, statistics);
       EXPECT_EQ(fresh->render(camera("iso"), wanted, statistics).rgba, iso.rgba) << threads;
       EXPECT_EQ(statistics.card_splats, stored);
     }
@@ -320,7 +325,7 @@ TEST_F(CardBricksTest, GiveMemoryUpWhereThereIsLessOfIt) {
 /// The textures of layers count: 16 bytes a pixel, of a picture whose bricks would fit without them.
 TEST_F(CardBricksTest, LeaveRoomForLayers) {
   FrameOptions wanted = options(0);
-  wanted.size = {600, 500};
+  wanted.size = {240, 200};
   const uint64_t of_layers = 16 * wanted.size.pixels();
   FrameStatistics card, ignored;
   const auto stored = [&](uint64_t bytes) {
@@ -437,7 +442,7 @@ TEST_F(FailingCard, ProjectsInSlabsWhatItsBuffersDoNotHoldAtOnce) {
   writeLatticeCache(folder_ / "lattice.splats", -0.5, {0.03, 0.02, 0.01});  // four layers of bricks
   open("lattice.splats");
   FrameOptions large = options(64 * kMiB);
-  large.size = {420, 350};  // the depths in which tiles of 4 pixels may order splats are small
+  large.size = {210, 175};  // the depths in which tiles of 4 pixels may order splats are small
   for (const char* view : {"iso", "+z"}) {
     FrameStatistics whole, slabs;
     const Image wanted = renderer()->render(camera(view), large, whole);
@@ -462,7 +467,7 @@ TEST_F(FailingCard, ProjectsInSlabsWhatItsMemoryDoesNotHoldAtOnce) {
   writeLatticeCache(folder_ / "lattice.splats", -0.5, {0.03, 0.02, 0.01});
   open("lattice.splats");
   FrameOptions large = options(64 * kMiB);
-  large.size = {420, 350};
+  large.size = {210, 175};
   FrameStatistics whole, slabs;
   const auto card = renderer();
   const Image wanted = card->render(camera("+z"), large, whole);

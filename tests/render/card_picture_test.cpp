@@ -42,7 +42,7 @@ int largestDifference(const std::vector<uint8_t>& a, const std::vector<uint8_t>&
 class CardPictureTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    writeRandomCache(folder_ / "a.splats", 3);
+    writeRandomCache(folder_ / "a.splats", 3, 1000);
     cache_ = std::make_unique<CacheReader>(folder_ / "a.splats");
     try {
       window_ = std::make_unique<SharedEgl>();

@@ -29,7 +29,7 @@ using faults::FaultySystemCalls;
 class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
  protected:
   FrameStreamingTest() {
-    writeRandomCache(path(), 3);
+    writeRandomCache(path(), 3, GetParam() == Backend::kOsmesa ? 1000 : 3000);
     cache_ = std::make_unique<CacheReader>(path());
   }
 
@@ -157,7 +157,7 @@ void FrameStreamingTest::expectWholeOrNone() const {
   wanted.threads = 3;
   const Image expected = renderer.render(camera("iso"), wanted, statistics);
 
-  const int rounds = faults::isWholeSweep() ? 500 : GetParam() == Backend::kCpu ? 125 : 50;
+  const int rounds = faults::isWholeSweep() ? 500 : GetParam() == Backend::kCpu ? 60 : 25;
   std::vector<std::stop_source> stops(static_cast<size_t>(rounds));
   std::atomic<int> round = -1, ended = -1;
   std::thread stopper([&] {

@@ -34,6 +34,7 @@ INVERTED = re.compile(r"(?:^|(?<=[.:;]\s))Of\s[^.:;]*[.:;]?")
 COMMENT = re.compile(r"\s*///?(?:\s(.*))?$")
 NAME = re.compile(r"`|\w[\w.]*[_A-Z0-9(\[]|\w+(?::|\.\w)|.(?!\w)")
 TABLE = re.compile(r"\S+(?:  | \|)")
+PARTS = re.compile("([{};])")
 # What opens a brace after which there are declarations again.
 SCOPE = re.compile(r"(?:^|[\s>])(?:class|struct|enum|union|namespace|extern)\b[^;{}()=]*(?:\([^()]*\)[^;{}()=]*)?$")
 
@@ -53,13 +54,14 @@ def begin_declarations(code):
         found.append(all(opened) and not head.strip().endswith((",", "(", "=")))
         if line.lstrip().startswith("#"):
             continue
-        for character in line:
-            if character == "{":
-                opened.append(bool(SCOPE.search(head)))
-            elif character == "}" and opened:
+        *parts, rest = PARTS.split(line)
+        for text, end in zip(parts[::2], parts[1::2]):
+            if end == "{":
+                opened.append(bool(SCOPE.search(head + text)))
+            elif end == "}" and opened:
                 opened.pop()
-            head = "" if character in "{};" else head + character
-        head += " "
+            head = ""
+        head += rest + " "
     return found
 
 

@@ -12,6 +12,7 @@
 
 C++ is read as clang-format leaves it: what a namespace holds is not indented.
 """
+import bisect
 import pathlib
 import re
 import sys
@@ -60,9 +61,10 @@ def is_function(match):
 def names_of(source):
     """(line, kind, name, whether it follows the scheme) of each name that is checked."""
     code = without_text(source)
+    ends = [match.start() for match in re.finditer("\n", code)]
 
     def line(place):
-        return code.count("\n", 0, place) + 1
+        return bisect.bisect_left(ends, place) + 1
 
     for match in TYPE.finditer(code):
         yield line(match.start(1)), "type", match[1], bool(UPPER_CAMEL.fullmatch(match[1]))

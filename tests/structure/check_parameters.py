@@ -17,7 +17,7 @@ FOLDERS = ("stream", "preprocess", "render", "tools", "tests", "bench")
 # A raw string is read as code if it holds a shader's function, and is left out otherwise.
 SHADER = re.compile(r"\b(void|float|u?int|bool|[iu]?vec[234])\s+\w+\s*\([^)]*\)\s*\{")
 SKIPPED = re.compile(r'//[^\n]*|/\*.*?\*/|R"(?P<mark>[^\s()\\]*)\((?P<raw>.*?)\)(?P=mark)"|"(?:\\.|[^"\\\n])*"|'
-                     r"(?<![0-9a-fA-F])'(?:\\.|[^'\\\n])+'", re.S)
+                     r"'(?<![0-9a-fA-F]')(?:\\.|[^'\\\n])+'", re.S)
 DIRECTIVE = re.compile(r"^[ \t]*#(?:[^\n]*\\\n)*[^\n]*", re.M)
 # A token, and whether white space precedes it.
 TOKEN = re.compile(r"(\s*)(\w+|::|->|\.\.\.|&&|\|\||<=|>=|==|!=|.)", re.S)
@@ -109,11 +109,11 @@ def items_of(tokens):
 def functions_of(source):
     """(line, name, parameters) of every list of parameters in a C++ source."""
     code = without_text(source)
-    tokens = [match.groups() for match in TOKEN.finditer(code) if match[2].strip()]
-    lines, line = [], 1
-    for match in TOKEN.finditer(code):
-        line += match[1].count("\n")
-        if match[2].strip():
+    tokens, lines, line = [], [], 1
+    for space, token in TOKEN.findall(code):
+        line += space.count("\n")
+        if not token.isspace():
+            tokens.append((space, token))
             lines.append(line)
     found = []
     for n, (_, token) in enumerate(tokens):
