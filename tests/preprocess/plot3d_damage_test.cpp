@@ -63,7 +63,7 @@ std::vector<TestBlock> doubleBlocks(uint32_t components) {
 }
 
 /// The next length of a file that is cut: usually one in five, which fall on every byte of a number.
-size_t next(size_t size) {
+size_t nextLength(size_t size) {
   return static_cast<size_t>(faults::nextInSweep(static_cast<int64_t>(size), 5));
 }
 
@@ -80,7 +80,7 @@ TEST(Plot3dDamage, EveryPrefixOfAGridIsRefusedOrReadRight) {
           const Bytes file = plot3dBytes(layout, doubleBlocks(0));
           const auto whole = open(folder, file);
           size_t accepted = 0;
-          for (size_t size = 0; size < file.size(); size = next(size)) {
+          for (size_t size = 0; size < file.size(); size = nextLength(size)) {
             try {
               const auto source = open(folder, {file.begin(), file.begin() + static_cast<ptrdiff_t>(size)});
               ++accepted;
@@ -110,7 +110,7 @@ TEST(Plot3dDamage, EveryPrefixOfASolutionIsRefused) {
         EXPECT_EQ(errorOf(folder, grid, &file), "");
         layout.precision_bytes = 4;
         const size_t size_in_single = plot3dBytes(layout, blocks).size();
-        for (size_t size = 0; size < file.size(); size = next(size)) {
+        for (size_t size = 0; size < file.size(); size = nextLength(size)) {
           if (records == kC && size == size_in_single)
             continue;  // a whole file, and the bits are as they are
           const Bytes prefix(file.begin(), file.begin() + static_cast<ptrdiff_t>(size));
