@@ -197,7 +197,7 @@ class IsoMesher {
           bricks_.size());
       read(splats, range);
       if (splats.overflowed()) {
-        if (range.count() == 1) throwTooLittle();
+        if (range.count() == 1) throwTooLittle("more");  // a tile of smaller voxels meets fewer splats
         const size_t middle = (range.begin + range.end) / 2;
         left.push_back({middle, range.end});
         left.push_back({range.begin, middle});
@@ -210,10 +210,10 @@ class IsoMesher {
   }
 
  private:
-  [[noreturn]] void throwTooLittle() const {
-    throw UsageError(
-        "--memory {}: is too little for an isosurface by --voxels {}; give more, or fewer --voxels",
-        byteText(options_.memory_bytes), options_.voxels);
+  /// `other`: what else than more memory helps.
+  [[noreturn]] void throwTooLittle(const char* other) const {
+    throw UsageError("--memory {}: is too little for an isosurface by --voxels {}; give more, or {} --voxels",
+                     byteText(options_.memory_bytes), options_.voxels, other);
   }
 
   void read(IsoSplats& splats, const TileRange& range) {
@@ -281,7 +281,7 @@ class IsoMesher {
         taken += isoCellsBytes(splats, end, lattice_.lattice);
         if (taken > bytes) break;
       }
-      if (end == begin) throwTooLittle();
+      if (end == begin) throwTooLittle("fewer");
       batch.assign(end - begin, {});
       arena_.execute([&] {
         tbb::parallel_for(size_t{0}, batch.size(), [&](size_t n) {

@@ -258,7 +258,7 @@ TEST_F(Isosurfaces, MeshesThatCannotBeAreRefused) {
       {{"-o", file("c.stl")}, 2, ".stl files hold isosurfaces; give --iso VALUE"},
       {{"-o", file("c.ply"), "--iso", "7"}, 2, "--iso 7: no isosurface: the values of f go from "},
       {{"-o", file("c.ply"), "--iso", "0.5", "--tf", "glow"}, 2, "--tf cannot be combined with --iso"},
-      {{"-o", file("c.ply"), "--iso", "0.5", "--memory", "1M"}, 2, "is too little for an isosurface"}};
+      {{"-o", file("c.ply"), "--iso", "0.5", "--memory", "1M"}, 2, "is too little for an isosurface by"}};
   for (const auto& [options, status, words] : refused) {
     const ProgramResult result = runProgram(Words{"export", file("a.splats")} + options);
     EXPECT_EQ(result.status, status) << result.err;
