@@ -4,8 +4,8 @@
 #
 #   tests/kill_ranks.sh [PROGRAM [SIZE [KILLS [FOLDER]]]]
 #
-# KILLS are those of each pass (1), at moments spread over it. SIZE is the generated grid's (47x40x36: several bricks), FOLDER has room for 250
-# bytes a node. With CURVISPLAT_WHOLE (tools/test.sh --whole) 20 and 160x120x100: 2 M nodes. dying_ranks lies beside PROGRAM.
+# KILLS are those of each pass (1), at moments spread over it. SIZE is the generated grid's (47x40x36, not refined: several bricks), FOLDER
+# has room for 250 bytes a node. With CURVISPLAT_WHOLE (tools/test.sh --whole) 20 and 160x120x100: 2 M nodes. dying_ranks lies beside PROGRAM.
 set -euo pipefail
 
 program=$(realpath "${1:-build/release/tools/curvisplat}")

@@ -92,8 +92,8 @@ uint64_t defaultMemory() {
 
 MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
   if (cap_bytes < leastMemory(variables))
-    throw UsageError("--memory {}: conversion of {} takes at least {}", byteText(cap_bytes),
-                     countText(variables, "scalar"), byteText(leastMemory(variables)));
+    throw Error("--memory {}: conversion of {} takes at least {}", byteText(cap_bytes),
+                countText(variables, "scalar"), byteText(leastMemory(variables)));
   const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;

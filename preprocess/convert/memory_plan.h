@@ -43,7 +43,7 @@ struct MemoryPlan {
   uint64_t bucket_bytes = 0;        // the records of such a bucket
   unsigned threads = 0;             // working at once, each with scratch memory
 
-  /// `threads` is what the user grants. Throws UsageError if `cap_bytes` is less than leastMemory().
+  /// `threads` is what the user grants. Throws Error if `cap_bytes` is less than leastMemory().
   static MemoryPlan of(uint64_t cap_bytes, size_t variables, unsigned threads);
 
   /// Makes the plan as of() does, but 0 stands for defaultMemory(), or for as many threads as the machine

@@ -340,7 +340,7 @@ class LongRows(FormatMemory):
         return files
 
     def expect_within(self, what, *paths, scalar="p"):
-        # Outer faces take a third of a conversion, and come from the same nodes: usually two formats have them.
+        # Outer faces take a third of a conversion, and come from the same nodes: usually two formats have them. With --whole all do.
         self.options = () if IS_WHOLE or what.startswith(("CGNS zones", "VTKHDF")) else ("--no-surfaces",)
         if not super().expect_within(f"{what}, long rows", *paths, scalar=scalar):
             return False

@@ -140,7 +140,7 @@ TEST_F(InterruptedConversion, StoppedItPrintsHowToContinue) {
 
 TEST_F(InterruptedConversion, StoppedEarlyItLeavesNothing) {
   FolderWatch outside(own_folder_.path());
-  RunningProgram program(wordsFor(output_, {}));
+  RunningProgram program(wordsFor(output_, {"--threads", "1"}));
   outside.waitUntil([&] { return fs::exists(partial()); });
   program.signal(SIGINT);
   const ProgramResult stopped = program.wait();

@@ -116,7 +116,8 @@ TEST_F(KeptCaches, AFullDiskIsRefusedWithWhatHelpsThere) {
 
 TEST_F(KeptCaches, FilesThatChangeMeanwhileAreConvertedAgain) {
   run({"generate", "half-annulus", "--size", "100x70x60", "-o", "changing"});
-  RunningProgram first({"render", "changing.xyz", "changing.fun", "-o", "grid.png", "--size", "20x20"});
+  RunningProgram first(
+      {"render", "changing.xyz", "changing.fun", "-o", "grid.png", "--size", "20x20", "--threads", "1"});
   ASSERT_TRUE(eventually([] {
     if (!fs::exists("kept/curvisplat")) return false;
     for (const auto& entry :
@@ -142,7 +143,8 @@ TEST_F(KeptCaches, FilesThatChangeMeanwhileAreConvertedAgain) {
 
 TEST_F(KeptCaches, OfAGridThatIsStoppedNothingStays) {
   run({"generate", "half-annulus", "--size", "120x100x80", "-o", "stopped"});
-  RunningProgram render({"render", "stopped.xyz", "stopped.fun", "-o", "grid.png", "--size", "20x20"});
+  RunningProgram render(
+      {"render", "stopped.xyz", "stopped.fun", "-o", "grid.png", "--size", "20x20", "--threads", "1"});
   const auto bytes_of_partial = [] {
     uint64_t bytes = 0;
     std::error_code error;

@@ -177,7 +177,7 @@ TEST_F(TwoScalarsTest, SlicesHaveTheOpacitiesOfTheOther) {
 
 /// Lit from where the viewer is.
 glm::dvec3 lit(const glm::dvec3& colour, double facing) {
-  return glm::min((0.3 + 0.7 * facing) * colour + glm::dvec3(0.25 * std::pow(facing, 32)), glm::dvec3(1.0));
+  return (0.3 + 0.7 * facing) * colour;
 }
 
 /// The inner cylinder of the half-annulus, jmin, in the colours of the one scalar and with the opacity of the other.

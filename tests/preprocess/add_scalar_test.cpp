@@ -197,7 +197,7 @@ TEST(AddScalar, TakesCoincidentNodes) {
 }
 
 TEST(AddScalar, LeavesOutWhatTheGridBlanks) {
-  const GridBlock block = gridBlock(40, 24, 24);
+  const GridBlock block = gridBlock(50, 40, 40);
   expectAsAtOnce(FunctionGridSource({block}, 3, [&](const GridNode& node) {
     NodeValues values = bentBox(node, block);
     values.blank = node.i < 3 || (node.j == 20 && node.k > 5);

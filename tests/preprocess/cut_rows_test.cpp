@@ -189,7 +189,7 @@ TEST_F(CutRows, HaveTheChecksumOfWholeRows) {
     return sum.value();
   };
   const uint64_t whole = checksum(1 << 20, kNoHalo);
-  for (const uint64_t window : {1u, 50u, 89u}) EXPECT_EQ(checksum(window, kNoHalo), whole) << window;
+  for (const uint64_t window : {1u, 7u, 89u}) EXPECT_EQ(checksum(window, kNoHalo), whole) << window;
   for (const uint64_t window : {1200u, 6000u}) EXPECT_EQ(checksum(window, kNodeSplatHalo), whole) << window;
   // A share of slabs has whole rows.
   for (const unsigned count : {2u, 3u, 7u}) {

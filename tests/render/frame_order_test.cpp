@@ -153,7 +153,7 @@ TEST_P(FrameOrderTest, IsThatOfOneSortAtAnyLevelAndWithPartsOfBricks) {
     uint64_t limit;
   };
   for (const Case& tried :
-       {Case{random_.get(), 0, 30'000}, {random_.get(), 4, 1'000'000}, {scene_.get(), 0, 100'000}}) {
+       {Case{random_.get(), 0, 5'000}, {random_.get(), 4, 1'000'000}, {scene_.get(), 0, 100'000}}) {
     if (GetParam() != Backend::kCpu && tried.cache == scene_.get() && !faults::isWholeSweep()) continue;
     const TransferFunction transfer_function = function(*tried.cache);
     FrameRenderer renderer(*tried.cache, 0, transfer_function, GetParam());
@@ -164,9 +164,9 @@ TEST_P(FrameOrderTest, IsThatOfOneSortAtAnyLevelAndWithPartsOfBricks) {
     const Image image = renderer.render(camera, wanted, statistics);
     EXPECT_EQ(image.rgba, globallySorted(*tried.cache, transfer_function, GetParam(), camera, wanted).rgba)
         << tried.lod_pixels << ' ' << tried.limit;
-    uint64_t finest = 0;
-    for (const Brick& brick : tried.cache->bricks()) finest += brick.isLeaf() ? brick.splats : 0;
-    EXPECT_LT(statistics.splats_read, finest);
+    FrameStatistics of_all;
+    renderer.render(camera, options(), of_all);
+    EXPECT_LT(statistics.splats_read, of_all.splats_read) << tried.lod_pixels << ' ' << tried.limit;
   }
 }
 
