@@ -223,14 +223,14 @@ TEST(BlockOverlap, OfOneBlockManyTimesIsFoundInFewPairs) {
 // The time grows as n log n, not as the square: every pair would take minutes.
 TEST(BlockOverlap, IsFoundAmongManyBlocks) {
   std::vector<TestBox> many;
-  constexpr int count = 100'000;
-  for (int n = 0; n < count - 1; ++n)
+  constexpr int kCount = 100'000;
+  for (int n = 0; n < kCount - 1; ++n)
     many.push_back({{2.0 * (n % 50), 2.0 * (n / 50 % 50), 2.0 * (n / 2500)}, {1, 1, 1}, 3});
   many.push_back(many[1234]);
   const auto overlaps = overlapsIn(boxes(many));
   ASSERT_EQ(overlaps.size(), 1u);
   EXPECT_EQ(overlaps[0].first, 1234u);
-  EXPECT_EQ(overlaps[0].second, static_cast<uint32_t>(count - 1));
+  EXPECT_EQ(overlaps[0].second, static_cast<uint32_t>(kCount - 1));
   EXPECT_NEAR(overlaps[0].share, 1, 1e-9);
 }
 
