@@ -374,7 +374,10 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
 }
 
 void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
-  label("opacities");
+  // Five buttons fill the line behind the word alone, not behind the column of labels.
+  ImGui::AlignTextToFramePadding();
+  ImGui::TextUnformatted("opacities");
+  ImGui::SameLine();
   const float column = ImGui::GetCursorPosX();
   const auto button = [](const char* name, const char* text, const char* what) {
     const bool pressed = ImGui::Button(text);
@@ -385,7 +388,7 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   result.automatic_opacities |=
       button("automatic", "Automatic",
              "range and opacities chosen from the data; a colour map that you chose stays");
-  const float gap = ImGui::GetStyle().ItemInnerSpacing.x;  // four of them fill a line
+  const float gap = ImGui::GetStyle().ItemInnerSpacing.x;
   ImGui::SameLine(0, gap);
   if (button(
           "ramp", "Ramp",
