@@ -119,7 +119,7 @@ class OddScalars(MeshCase):
             self.assertIn(f"{self.folder}/a.nc --steps all", drawn.stderr)
             self.assertNotIn("everywhere", drawn.stderr)
             refused = self.run_program("render", *picture, "--step", "1")
-            self.assertIn("has one time step; `convert --steps all` makes a cache of all", refused.stderr)
+            self.assertIn("has one time step, 0; of files with more, `convert --steps all`", refused.stderr)
 
     def test_a_scalar_of_too_wide_a_range_is_left_out_of_a_picture_of_others(self):
         k, j, i = np.meshgrid(np.arange(4), np.arange(4), np.arange(4), indexing="ij")
