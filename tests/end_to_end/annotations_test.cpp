@@ -178,7 +178,7 @@ TEST_F(Annotations, EachFunctionHasABarWithATitleOfItsOwn) {
   const Image one = render({"--scalar-bar"}),
               other = render({"--scalar-bar-title", "height above the plate"});
   EXPECT_GT(changed(one, other, 140, 200, 0, 160), 20);
-  EXPECT_GT(changed(one, render({"--scalar-bar-title", ""}), 140, 200, 0, 160), 20);
+  EXPECT_GT(changed(one, render({"--scalar-bar-title", ""}), 140, 200, 0, 160), 10);  // the letter f
   const ProgramResult wrong = runProgram({"render", file("a.splats"), "-o", file("b.png"),
                                           "--scalar-bar-title", "a", "--scalar-bar-title", "b"});
   EXPECT_EQ(wrong.status, 2);

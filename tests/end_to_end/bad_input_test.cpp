@@ -264,7 +264,7 @@ TEST_F(BadInput, UnknownScene) {
 
 TEST_F(BadInput, InvalidSizeOfAScene) {
   for (const char* size :
-       {"", "4", "4x4", "4x4x4x4", "4x4x1", "ax4x4", "-4x4x4", "4x4x4 ", "99999999999999999999x4x4"})
+       {"4", "4x4", "4x4x4x4", "4x4x1", "ax4x4", "-4x4x4", "4x4x4 ", "99999999999999999999x4x4"})
     expectRefused({"generate", "wake", "--size", size, "-o", file("sized")}, 2, {"NIxNJxNK"});
 }
 
