@@ -10,14 +10,14 @@
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-# run PRESET [CTEST OPTIONS]: runs the tests of a build; fails if there are none. Half as many again as there are cores at a time: a third of
+# run PRESET [CTEST OPTIONS]: runs the tests of a build; fails if there are none. Twice as many as there are cores at a time: a third of
 # the time they wait, for the disk, for windows or for servers. ctest leaves out what matches each -LE, not any: where another one is given,
 # the tests of the label `whole` skip themselves.
 run() {
   local preset=$1 left_out=(-LE '^whole$')
   shift
   if [[ -v CURVISPLAT_WHOLE || " $* " =~ \ (-LE|--label-exclude)[\ =] ]]; then left_out=(); fi
-  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j"$(($(nproc) * 3 / 2))" "${left_out[@]}" "$@"
+  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j"$(($(nproc) * 2))" "${left_out[@]}" "$@"
 }
 
 form=plain
@@ -36,7 +36,7 @@ export TSAN_OPTIONS=suppressions=$root/tests/tsan.supp:halt_on_error=1
 
 case $form in
   plain)
-    echo "test: building takes about 15 minutes from nothing on two cores, all tests some 22"
+    echo "test: building takes about 15 minutes from nothing on two cores, all tests some 18"
     "$root/tools/setup.sh"
     # While the program is built: the smoke test of bench/ also draws with VTK; tests/end_to_end/fuse_test.py needs fusepy; tests/serve a
     # browser and websocket; movies ffmpeg; tests/stream/read_cache.py, tests/python and the tests of files that others write need the others.
