@@ -43,7 +43,8 @@ class FidelityProperties : public testing::Test {
     return SceneGridSource(makeScene("half-annulus"), size, 4);
   }
 
-  /// The cache of so many nodes around, and half as many along the others, converted for the first test that asks.
+  /// Returns the cache of a grid with this number of nodes around, and half of it along the other axes. The first test that asks for
+  /// it converts the grid.
   static std::filesystem::path halfAnnulusCache(uint64_t nodes = 128) {
     static const TemporaryFolder folder;
     const std::filesystem::path cache = folder / std::to_string(nodes);

@@ -50,7 +50,8 @@ struct MarchSteps {
   double step = 0.004;  // world units
   double cells = 0.5;   // of a grid's cell, at the point where a step begins
   double near = 0;      // perspective: as ScreenView::near
-  int every = 1;  // only one pixel of so many along x and along y is marched: the image is so much smaller
+  // 2: every second pixel along x and along y is marched, and the image has half the width and height.
+  int every = 1;
   // A step is halved until its optical depth, and the light from it, are within this of the midpoint rule's.
   // But at jumps, Simpson's rule is far nearer to the truth.
   double tolerance = 1e-5;

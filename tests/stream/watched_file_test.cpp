@@ -80,7 +80,7 @@ TEST_F(WatchedFileTest, FilesThatOthersLeadToAreWatchedToo) {
   EXPECT_EQ(warnings.size(), 1u);
   writeLater(linked, "123");
   EXPECT_EQ(errorOf([&] { files.requireWhole(); }).find(linked.string() + ": was changed"), 0u);
-  // The same file has another name here.
+  // "./NAME" is another name of the same file.
   const WatchedFiles again({(folder_ / "." / path_.filename()).string()});
   writeLater(linked, "12");
   EXPECT_NE(errorOf([&] { again.requireWhole(); }), "");

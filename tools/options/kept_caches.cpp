@@ -18,7 +18,6 @@
 #include <thread>
 #include <utility>
 
-#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/common/unpacked_file.h"
@@ -120,7 +119,7 @@ void note(const fs::path& memo, const std::string& stamp, const FileNote& of_fil
 /// damaged: whoever opens it reports that.
 std::optional<std::set<fs::path>> linkedBy(const fs::path& path, const fs::path& known) {
   try {
-    if (beginningOf(InputFile(path), kHdf5Signature.size()) != kHdf5Signature) return std::set<fs::path>{};
+    if (!isHdf5(InputFile(path))) return std::set<fs::path>{};
     if (const auto noted = notedOf(memoOf(path, known), stampOf(path))) return noted->linked;
     tryHdf5(path);
     return linkedFilesOf(path);

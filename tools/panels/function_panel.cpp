@@ -378,7 +378,6 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted("opacities");
   ImGui::SameLine();
-  const float column = ImGui::GetCursorPosX();
   const auto button = [](const char* name, const char* text, const char* what) {
     const bool pressed = ImGui::Button(text);
     nameWidget(name);
@@ -401,12 +400,7 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
   }
   const auto set = [&](const char* name, const char* text, const char* what,
                        std::span<const OpacityPoint> points) {
-    const float width = ImGui::CalcTextSize(text).x + 2 * ImGui::GetStyle().FramePadding.x;
-    const float end = ImGui::GetWindowPos().x + ImGui::GetContentRegionMax().x;
-    if (ImGui::GetItemRectMax().x + gap + width <= end)
-      ImGui::SameLine(0, gap);
-    else
-      ImGui::SetCursorPosX(column);
+    ImGui::SameLine(0, gap);
     if (!button(name, text, what)) return;
     function.setOpacities({points.begin(), points.end()});
     result.changed = true;

@@ -90,10 +90,6 @@ void convert(std::string_view type, const std::byte* from, uint64_t count, Value
   convert<int64_t>(from, count, to);
 }
 
-bool isHdf5(const InputFile& file) {
-  return beginningOf(file, kHdf5Signature.size()) == kHdf5Signature;
-}
-
 struct Selection {
   std::array<cgsize_t, 3> start, end, stride{1, 1, 1};
 };

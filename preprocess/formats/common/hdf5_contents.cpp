@@ -8,7 +8,6 @@
 #include <string_view>
 #include <utility>
 
-#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/hdf5_objects.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "stream/base/error.h"
@@ -26,7 +25,7 @@ constexpr uint64_t kMaxPacking = 65536, kSmall = uint64_t{1} << 20;
 }  // namespace
 
 std::set<std::string> rootLinksOf(const InputFile& file, std::initializer_list<const char*> names) {
-  if (beginningOf(file, kHdf5Signature.size()) != kHdf5Signature) return {};
+  if (!isHdf5(file)) return {};
   requireWholeHdf5(file);
   tryHdf5(file.path());
   const QuietHdf5 quiet;

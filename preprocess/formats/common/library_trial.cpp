@@ -56,6 +56,10 @@ std::optional<uint64_t> statedEnd(const std::array<uint8_t, kLooked>& begin) {
 
 }  // namespace
 
+bool isHdf5(const InputFile& file) {
+  return beginningOf(file, kHdf5Signature.size()) == kHdf5Signature;
+}
+
 void requireWholeHdf5(const InputFile& file) {
   std::array<uint8_t, kLooked> begin{};
   file.readAt(0, std::span(begin).first(std::min<uint64_t>(begin.size(), file.size())));

@@ -18,6 +18,9 @@ namespace curvisplat {
 
 inline constexpr std::string_view kHdf5Signature = "\x89HDF\r\n\x1a\n";
 
+/// Whether `file` begins as HDF5.
+bool isHdf5(const InputFile& file);
+
 /// Throws TruncatedFile if `file` begins as HDF5 and ends before the address that its superblock (versions 0
 /// to 3) states: HDF5 reports a truncated file as an unknown error.
 void requireWholeHdf5(const InputFile& file);
