@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <random>
 #include <tuple>
@@ -16,6 +17,7 @@
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
 #include "tests/reference/function_grid.h"
+#include "tests/support/memory_limit.h"
 
 namespace curvisplat {
 namespace {
@@ -240,6 +242,24 @@ TEST(CountingLevel, IsThatOfVoxelsWithANodeEach) {
   EXPECT_GT(countingLevel(1000000, {1, 1, 0}), countingLevel(1000000, {1, 1, 1}));
   EXPECT_EQ(countingLevel(1000000, {0, 0, 0}), countingLevel(1000000, {1, 1, 1}));
   EXPECT_LE(countingLevel(uint64_t{1} << 47, {1, 0, 0}), static_cast<uint32_t>(kMaxLevel));
+}
+
+TEST(CountingGrid, IsDestroyedWhereMemoryHasEnded) {
+  if (kIsSanitized) GTEST_SKIP() << "sanitizers need the address space themselves";
+  const auto destroys = [] {
+    std::mt19937_64 random(5);
+    auto counts = makeCountingGrid(14, 16 << 20);
+    VoxelRuns runs(14);
+    for (int n = 0; n < 20000; ++n) runs.add(randomPosition(random, 48));
+    counts->add(14, runs.runs());
+    const test::MemoryLimit limit(0);
+    for (size_t bytes = 1 << 20; bytes > 0; bytes /= 2)  // what the allocator holds, too
+      while (std::malloc(bytes) != nullptr) {
+      }
+    counts.reset();
+    std::_Exit(0);
+  };
+  EXPECT_EXIT(destroys(), testing::ExitedWithCode(0), "");
 }
 
 TEST(CountingGrid, SaturatesInsteadOfOverflowing) {

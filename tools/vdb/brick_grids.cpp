@@ -65,7 +65,7 @@ std::vector<std::byte> fileOf(const RootCube& root, std::span<const Brick> brick
   for (size_t n = 0; n < bricks.size(); ++n) {
     const Cell& cell = bricks[n].cell;
     if (n == 0 || cell.level != bricks[n - 1].cell.level) {
-      grid = openvdb::Int32Grid::create(kBackground);
+      grid = makeVdbGrid<openvdb::Int32Grid>(kBackground);
       grid->setName(gridName(cell.level));
       grid->insertMeta(kWorldUnits, openvdb::DoubleMetadata(world_units));
       const double size = root.cellSize(cell.level) / world_units;

@@ -31,6 +31,11 @@ struct SizedTree {
   openvdb::tree::ValueAccessor<CountTree> accessor{tree};
   uint64_t bytes = 0;
 
+  SizedTree() = default;
+  SizedTree(const SizedTree&) = delete;
+  SizedTree& operator=(const SizedTree&) = delete;
+  ~SizedTree() { deleteNodes(tree); }
+
   void add(const openvdb::Coord& at, uint64_t count) {
     Leaf* leaf = accessor.probeLeaf(at);
     if (leaf == nullptr) {

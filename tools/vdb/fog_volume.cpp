@@ -14,8 +14,8 @@ class VdbFogVolume final : public FogVolume {
  public:
   VdbFogVolume(const glm::dvec3& origin, double side) {
     initializeOpenVdb();
-    value_ = openvdb::FloatGrid::create(0.0f);
-    density_ = openvdb::FloatGrid::create(0.0f);
+    value_ = makeVdbGrid<openvdb::FloatGrid>(0.0f);
+    density_ = makeVdbGrid<openvdb::FloatGrid>(0.0f);
     value_->setName("value");
     density_->setName("density");
     density_->setGridClass(openvdb::GRID_FOG_VOLUME);

@@ -15,6 +15,22 @@ namespace curvisplat {
 /// Registers OpenVDB's types, which reading and writing grids needs. Any thread, any number of times.
 void initializeOpenVdb();
 
+/// Deletes a tree's nodes one by one. A tree's destructor first lists them, and ends the process where there is no memory left for
+/// the list. To be called before it; the tree's accessors are no longer valid.
+template <typename Tree>
+void deleteNodes(Tree& tree) noexcept {
+  tree.root().clear();
+}
+
+/// A grid without values, whose nodes are deleted as by deleteNodes().
+template <typename Grid>
+typename Grid::Ptr makeVdbGrid(typename Grid::ValueType background) {
+  return typename Grid::Ptr(new Grid(background), [](Grid* grid) {
+    deleteNodes(grid->tree());
+    delete grid;
+  });
+}
+
 namespace vdb_plugin {
 
 std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks);
