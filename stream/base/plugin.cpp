@@ -38,6 +38,13 @@ void* openPlugin(const char* name, int flags, std::string& why_not) {
   return nullptr;
 }
 
+const char* pluginAdvice(std::string_view why_not) {
+  // The dynamic linker's and the system's words for a file that finds no room.
+  for (const char* words : {"failed to map", "cannot map", "annot allocate"})
+    if (why_not.find(words) != std::string_view::npos) return "raise the limit of memory (ulimit -v)";
+  return "install curvisplat again";
+}
+
 fs::path bundledFile(const char* name) {
   std::error_code error;
   const fs::path folder = thisFile().parent_path();

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace curvisplat {
 
@@ -11,6 +12,10 @@ namespace curvisplat {
 /// function, as in the Python package), then where packages put plug-ins, then where the dynamic linker looks for libraries.
 /// Returns nullptr, with the reason in `why_not`, if there is none or it cannot be loaded. Any thread.
 void* openPlugin(const char* name, int flags, std::string& why_not);
+
+/// What to do about a plug-in that could not be loaded, for the end of a message: raise the limit of memory where that is the reason
+/// (ulimit -v), else install the program again.
+const char* pluginAdvice(std::string_view why_not);
 
 /// A file that a bundle carries, since it must not rely on the system's: share/curvisplat/NAME beside the program's folder, or NAME
 /// beside the Python module. Empty outside of bundles. Any thread.

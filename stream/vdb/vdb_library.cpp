@@ -65,7 +65,7 @@ const VdbFunctions& loadFunctions() {
   const VdbFunctions* const functions = entry ? entry(CURVISPLAT_VERSION) : nullptr;
   if (module && !functions) why_not = "it is of another version than the program";
   if (!functions)
-    throw Error("OpenVDB is needed and cannot be loaded: {}: {}; install curvisplat again", kName, why_not);
+    throw Error("OpenVDB is needed and cannot be loaded: {}: {}; {}", kName, why_not, pluginAdvice(why_not));
   return *functions;
 }
 

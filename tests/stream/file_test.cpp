@@ -12,6 +12,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/plugin.h"
 #include "stream/base/temporary_files.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
@@ -287,6 +288,13 @@ TEST(TemporarySubfolder, LeavesOthersAlone) {
 TEST(TemporarySubfolder, ErrorsNameTheFolder) {
   const std::string error = errorOf([] { const TemporarySubfolder folder("/no/such/place", kEnding); });
   EXPECT_TRUE(error.starts_with("/no/such/place/curvisplat.")) << error;
+}
+
+TEST(PluginAdvice, TellsLackOfMemoryFromAMissingFile) {
+  EXPECT_STREQ(pluginAdvice("libopenvdb.so.10.0: failed to map segment from shared object"),
+               "raise the limit of memory (ulimit -v)");
+  EXPECT_STREQ(pluginAdvice("a.so: cannot open shared object file: No such file or directory"),
+               "install curvisplat again");
 }
 
 }  // namespace

@@ -15,9 +15,8 @@ void* openDataLibraries() {
   std::string why_not;
   void* const module = openPlugin(kName, RTLD_LAZY | RTLD_LOCAL, why_not);
   if (!module)
-    throw Error(
-        "the libraries of this format are needed and cannot be loaded: {}: {}; install curvisplat again",
-        kName, why_not);
+    throw Error("the libraries of this format are needed and cannot be loaded: {}: {}; {}", kName, why_not,
+                pluginAdvice(why_not));
   return module;
 }
 
