@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 #include <imgui.h>
-#include <imgui_internal.h>  // GetItemID(), MarkItemEdited()
+#include <imgui_internal.h>  // GetItemID(), MarkItemEdited(), ImGuiWindow
 
 #include <algorithm>
 #include <array>
@@ -230,9 +230,13 @@ void nameWidget(const std::string& name) {
 }
 
 void nameWithoutTab(const std::string& name) {
-  // A list that has just opened does not know its size yet, and so not its place.
-  if (!places().file || ImGui::IsWindowAppearing()) return;
+  if (!places().file) return;
   const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
+  // A list that has just opened, or become longer, does not know its size yet, and a click there would close it.
+  const ImGuiWindow& window = *ImGui::GetCurrentWindow();
+  const bool is_list = (window.Flags & ImGuiWindowFlags_Popup) != 0;
+  const ImVec2 centre(at.x + 0.5f * size.x, at.y + 0.5f * size.y);
+  if (window.Appearing || (is_list && !window.ClipRect.Contains(centre))) return;
   nameArea(name, static_cast<double>(at.x), static_cast<double>(at.y), static_cast<double>(size.x),
            static_cast<double>(size.y));
   const ImGuiID id = ImGui::GetItemID();
