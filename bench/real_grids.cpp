@@ -203,7 +203,7 @@ class Measurement {
     const OpenGrid grid(named);
     const std::filesystem::path cache = settings_.folder / (grid.name + ".splats");
     if (settings_.voxel_pixels == 0)
-      convertGrid(*refined(named.open(), refinementOf(*grid.source)), cache, grid.scalar);
+      convertGrid(*refined(named.open(), refinementOf(*grid.source, grid.scalar)), cache, grid.scalar);
     PictureSheet sheet(size_, 1);
     for (const NamedView& view : chosenViews(grid)) {
       std::vector<Image> pictures;
@@ -224,8 +224,8 @@ class Measurement {
   }
 
  private:
-  Refinement refinementOf(const GridSource& source) const {
-    return settings_.refine == 0 ? refinementByNeed(source) : Refinement(settings_.refine);
+  Refinement refinementOf(const GridSource& source, uint32_t scalar) const {
+    return settings_.refine == 0 ? refinementByNeed(source, {scalar}) : Refinement(settings_.refine);
   }
 
   std::vector<NamedView> chosenViews(const OpenGrid& grid) const {

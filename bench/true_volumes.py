@@ -104,20 +104,27 @@ def axes_of(view):
 
 
 def depths_of(blocks, middle, scale, points):
-    """The volume that lies behind each square of the picture, of each view: points in all cells, each with its share of the volume. They
-    are those of a sequence of low discrepancy, which each cell begins elsewhere, so that the points of many cells do not line up."""
+    """The volume that lies behind each square of the picture, of each view: points in all cells, about as many as the cell has of the
+    volume, each with its share of it. They are those of a sequence of low discrepancy, which each cell begins elsewhere, so that the
+    points of many cells do not line up."""
+    at_once = 1 << 16
     count = PIXELS // BLOCK
     sums = {view: np.zeros(count * count) for view in VIEWS}
     to_squares = np.concatenate([axes_of(view)[:2] for view in VIEWS]) * count / (2 * scale)
-    cells_of_blocks = [drawn_cells(xyz, values)[0] for xyz, values in blocks]
-    per_cell = max(64, -(-points // sum(len(corners) for corners in cells_of_blocks)))
-    for corners in cells_of_blocks:
-        terms = coefficients(corners)
-        begin = np.random.default_rng(1).random((3, len(corners)))
-        for n in range(per_cell):
-            u, v, w = ((begin[axis] + n * 1.2207440846057596 ** (-axis - 1)) % 1 for axis in range(3))
-            part = determinant(terms, u, v, w) / per_cell
-            places = (to_squares @ (trilinear(terms, u, v, w) - middle[:, None]) + count / 2).astype(int)
+    terms = np.concatenate([coefficients(drawn_cells(xyz, values)[0]) for xyz, values in blocks], axis=-1)
+    volume = determinant(terms, 0.5, 0.5, 0.5)
+    halvings = np.rint(np.log2(np.maximum(points * volume / volume.sum(), 64))).astype(int)
+    begin = np.random.default_rng(1).random((3, len(volume), 1))
+    for per_cell in 1 << np.unique(halvings):
+        some = 1 << halvings == per_cell
+        of_some = terms[..., some, None]
+        step = max(1, at_once // some.sum())
+        for first in range(0, per_cell, step):
+            n = np.arange(first, min(first + step, per_cell))
+            u, v, w = ((begin[axis, some] + n * 1.2207440846057596 ** (-axis - 1)) % 1 for axis in range(3))
+            part = np.ravel(determinant(of_some, u, v, w) / per_cell)
+            at = trilinear(of_some, u, v, w).reshape(3, -1)
+            places = (to_squares @ (at - middle[:, None]) + count / 2).astype(int)
             for view, x, y in zip(VIEWS, places[::2], places[1::2]):
                 sums[view] += np.bincount(y * count + x, weights=part, minlength=count * count)
     return {view: of_view.reshape(count, count) for view, of_view in sums.items()}
@@ -384,9 +391,10 @@ LIMITS = {
     "terrain": (0.02, 1.2, 1.06, 9, 0.05),
     "sheared": (0.02, 0.9, 1.05, 10, 0.05),
     "field_lines": (0.02, 1.8, 1.09, 10, 0.05),
-    "sea_floor": (0.02, 2.2, 1.13, 12, 0.05),
+    "sea_floor": (0.02, 0.9, 1.05, 12, 0.05),
     "sea_floor_cells": (0.02, 1.5, 1.07, 12, 0.05),
     "octree": (0.02, 3.2, 1.15, 13, 0.05),
+    "octree_cells": (0.05, 2.4, 1.11, 15, 0.05),
 }
 
 

@@ -139,7 +139,7 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, const Scat
   if (centring() == Centring::kCell) {
     CellSlopes slopes(reader_.cells(), reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { slopes.add(cells); });
-    counts = slopes.finish(take, slabs_, progress);
+    counts = slopes.finish(take, slabs_, hanging_, progress);
   } else {
     PointSums sums(reader_.points(), drawn_cells_, reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { sums.add(cells); });

@@ -74,7 +74,7 @@ struct ScatterCounts {
   uint64_t degenerate = 0;  // splats with a floored axis
   uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
   uint64_t halved = 0;      // cells of a mesh that became two splats
-  uint64_t hanging = 0;     // points of a mesh that are fitted where nodes hang
+  uint64_t hanging = 0;     // points or cells of a mesh that are fitted where nodes hang
 };
 
 /// Makes splats of a grid. Results depend on its files, scalars and blank value alone: not on threads or

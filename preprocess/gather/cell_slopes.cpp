@@ -6,7 +6,9 @@
 #include <array>
 #include <atomic>
 #include <cstring>
+#include <glm/geometric.hpp>
 #include <limits>
+#include <utility>
 
 #include "preprocess/gather/streams_file.h"
 #include "preprocess/grid/parallel.h"
@@ -25,8 +27,9 @@ struct BodyRecord {
 };
 
 struct FaceRecord {
-  uint64_t cell;
-  glm::dvec3 centre_of_cell, inward, centre;  // values follow
+  HangingFaces::Face face;  // without half axes if there is no last_corner
+  glm::dvec3 inward;
+  uint64_t last_corner;  // by FaceList::lastOfQuad(); values follow
 };
 
 /// Cells of one range that share a face, by their places in it.
@@ -38,6 +41,13 @@ struct PairRecord {
 struct NeighbourRecord {
   uint64_t cell, neighbour;
   glm::dvec3 centre;  // of the neighbour; values follow
+};
+
+/// A neighbour that is larger or smaller; twice where the faces have two corners in common, and once more for another
+/// pair of faces.
+struct SideRecord {
+  uint64_t cell, neighbour;
+  CellSide side;  // values follow
 };
 
 /// Records of one size, with values behind each.
@@ -85,15 +95,17 @@ void put(std::byte* to, const Record& record, std::span<const float> values) {
 /// The cells of a range, each with those that it shares a face with.
 class RangeOfCells {
  public:
-  explicit RangeOfCells(size_t fields) : bodies_(fields), beside_(fields), fields_(fields) {}
+  explicit RangeOfCells(size_t fields)
+      : bodies_(fields), beside_(fields), other_sizes_(fields), fields_(fields) {}
 
   struct Streams {
-    const StreamsFile &bodies, &pairs, &neighbours;
+    const StreamsFile &bodies, &pairs, &neighbours, &sides;
   };
   /// Cells [first_cell, first_cell + cells).
   void load(const Streams& streams, size_t range, uint64_t first_cell, uint64_t cells) {
     bodies_.load(streams.bodies, range);
     beside_.load(streams.neighbours, range);
+    other_sizes_.load(streams.sides, range);
     places_.assign(cells, 0);
     for (size_t n = 0; n < bodies_.size(); ++n)
       places_[bodies_[n].cell - first_cell] = static_cast<uint32_t>(n);
@@ -105,6 +117,9 @@ class RangeOfCells {
       });
       for (size_t n = 0; n < beside_.size(); ++n)
         use(places_[beside_[n].cell - first_cell], static_cast<uint32_t>(bodies_.size() + n));
+      for (size_t n = 0; n < other_sizes_.size(); ++n)
+        use(places_[other_sizes_[n].cell - first_cell],
+            static_cast<uint32_t>(bodies_.size() + beside_.size() + n));
     };
     forEachEnd([&](uint32_t body, uint32_t) { ++begins_[body + 1]; });
     for (size_t n = 1; n < begins_.size(); ++n) begins_[n] += begins_[n - 1];
@@ -116,22 +131,40 @@ class RangeOfCells {
   size_t size() const { return bodies_.size(); }
   BodyRecord body(size_t n) const { return bodies_[n]; }
   void values(size_t n, std::span<float> out) const { bodies_.values(n, out); }
+  /// The result of neighbours(): [neighbour] and [neighbour * fields + field].
+  struct Neighbours {
+    std::vector<glm::dvec3> steps;
+    std::vector<float> values;
+    std::vector<CellSide> sides;                       // at those that are larger or smaller
+    std::vector<std::pair<uint64_t, uint32_t>> order;  // scratch: their numbers and places
+  };
   /// The neighbours of cell n, in the order of their numbers. Any thread.
-  void neighbours(size_t n, std::vector<glm::dvec3>& steps, std::vector<float>& values) {
-    steps.clear();
-    values.clear();
-    const std::span<uint32_t> of_cell =
-        std::span(neighbours_).subspan(begins_[n], begins_[n + 1] - begins_[n]);
-    std::sort(of_cell.begin(), of_cell.end(),
-              [&](uint32_t a, uint32_t b) { return numberOf(a) < numberOf(b); });
+  void neighbours(size_t n, Neighbours& out) const {
+    out.steps.clear();
+    out.values.clear();
+    out.sides.clear();
+    out.order.clear();
+    for (size_t at = begins_[n]; at < begins_[n + 1]; ++at)
+      out.order.emplace_back(numberOf(neighbours_[at]), neighbours_[at]);
+    std::sort(out.order.begin(), out.order.end(), [&](const auto& a, const auto& b) {
+      return a.first != b.first ? a.first < b.first : isBefore(a.second, b.second);
+    });
     const glm::dvec3 centre = bodies_[n].body.centre;
-    for (const uint32_t neighbour : of_cell) {
-      values.resize(values.size() + fields_);
-      const std::span<float> of_neighbour = std::span(values).last(fields_);
-      const bool here = neighbour < bodies_.size();
-      const size_t other = neighbour - bodies_.size();
-      here ? bodies_.values(neighbour, of_neighbour) : beside_.values(other, of_neighbour);
-      steps.push_back((here ? bodies_[neighbour].body.centre : beside_[other].centre) - centre);
+    for (size_t at = 0; at < out.order.size(); ++at) {
+      const auto [number, neighbour] = out.order[at];
+      const bool is_known = at > 0 && out.order[at - 1].first == number;
+      if (neighbour >= firstSide()) {
+        const CellSide side = other_sizes_[neighbour - firstSide()].side;
+        const bool is_same = is_known && out.order[at - 1].second >= firstSide() &&
+                             !isBefore(out.order[at - 1].second, neighbour);
+        if (!is_same) out.sides.push_back(side);
+        if (!is_known) addStep(other_sizes_, neighbour - firstSide(), side.neighbour - centre, out);
+      } else if (neighbour >= bodies_.size()) {
+        const size_t other = neighbour - bodies_.size();
+        addStep(beside_, other, beside_[other].centre - centre, out);
+      } else {
+        addStep(bodies_, neighbour, bodies_[neighbour].body.centre - centre, out);
+      }
     }
   }
 
@@ -145,19 +178,48 @@ class RangeOfCells {
       }
     });
   }
-  /// The number of a cell that is among the bodies, or among another range's records behind them.
-  uint64_t numberOf(uint32_t neighbour) const {
-    return neighbour < bodies_.size() ? bodies_[neighbour].cell
-                                      : beside_[neighbour - bodies_.size()].neighbour;
+  template <typename Record>
+  void addStep(const RecordArray<Record>& records, size_t n, const glm::dvec3& step, Neighbours& out) const {
+    out.steps.push_back(step);
+    out.values.resize(out.values.size() + fields_);
+    records.values(n, std::span(out.values).last(fields_));
+  }
+  /// Places count the bodies, another range's records behind them, and the sides behind those.
+  size_t firstSide() const { return bodies_.size() + beside_.size(); }
+  uint64_t numberOf(size_t place) const {
+    if (place < bodies_.size()) return bodies_[place].cell;
+    return place < firstSide() ? beside_[place - bodies_.size()].neighbour
+                               : other_sizes_[place - firstSide()].neighbour;
+  }
+  /// Orders the places of one neighbour: sides come last, by where they are, since memory decides how they come.
+  bool isBefore(size_t a, size_t b) const {
+    if (a < firstSide() || b < firstSide()) return a < b;
+    const auto placeOf = [&](size_t n) {
+      const CellSide side = other_sizes_[n - firstSide()].side;
+      return std::array{side.face.x,    side.face.y,    side.face.z,
+                        side.outward.x, side.outward.y, side.outward.z};
+    };
+    return placeOf(a) < placeOf(b);
   }
 
   RecordArray<BodyRecord> bodies_;
   RecordArray<NeighbourRecord> beside_;
+  RecordArray<SideRecord> other_sizes_;
   const size_t fields_;
   std::vector<uint32_t> places_;         // [cell of the range], among the bodies
   std::vector<uint32_t> begins_, ends_;  // [body], in neighbours_
   std::vector<uint32_t> neighbours_;
 };
+
+FaceRecord recordOf(const GatheredCells& cells, const HalfFace& face, uint64_t last_corner,
+                    const glm::dvec3& centre_of_cell) {
+  FaceRecord record{{cells.numbers[face.cell], centre_of_cell, face.centre}, face.inward, last_corner};
+  if (last_corner == FaceList::kNoCorner) return record;
+  std::array<glm::dvec3, 4> at;
+  for (size_t n = 0; n < at.size(); ++n) at[n] = cells.at[cells.corner_begin[face.cell] + face.corners[n]];
+  record.face.half_axes = HangingFaces::halfAxes(at, face.inward);
+  return record;
+}
 
 /// Sets the bodies of cells [begin, end).
 void setBodies(const GatheredCells& cells, size_t begin, size_t end, std::span<CellBody> out) {
@@ -184,6 +246,10 @@ CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, con
   bodies_ = std::make_unique<StreamsFile>(scratch, ranges, shares.body_bytes);
   pairs_ = std::make_unique<StreamsFile>(scratch, ranges, shares.pair_bytes);
   neighbours_ = std::make_unique<StreamsFile>(scratch, ranges, shares.neighbour_bytes);
+  sides_ = std::make_unique<StreamsFile>(scratch, ranges, shares.side_bytes);
+  hanging_ = std::make_unique<HangingFaces>(fields * sizeof(float), ranges,
+                                            HangingFaces::Memory{shares.direction_bytes, shares.corner_bytes},
+                                            scratch);
   planes_ = std::make_unique<OuterPlanes>(ranges, range_cells_, shares.plane_bytes, scratch);
   faces_ = std::make_unique<FaceMatcher>(records.face, cells * kUsualFaces, shares.face_bytes, scratch);
   neighbour_.resize(records.neighbour);
@@ -191,18 +257,31 @@ CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, con
 
 CellSlopes::RecordBytes CellSlopes::recordBytes(size_t fields) {
   const uint64_t value_bytes = fields * sizeof(float);
-  return {sizeof(BodyRecord) + value_bytes, sizeof(FaceRecord) + value_bytes, sizeof(PairRecord),
-          sizeof(NeighbourRecord) + value_bytes};
+  return {sizeof(BodyRecord) + value_bytes,
+          sizeof(FaceRecord) + value_bytes,
+          sizeof(PairRecord),
+          sizeof(NeighbourRecord) + value_bytes,
+          HangingFaces::bytesOfCorner(value_bytes),
+          sizeof(SideRecord) + value_bytes};
 }
 
 CellSlopes::Shares CellSlopes::sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes) {
   const RecordBytes records = recordBytes(fields);
-  memory_bytes -= std::min(FaceMatcher::waitingBytes(records.face, cells * kUsualFaces), memory_bytes / 4);
+  const uint64_t waiting =
+      std::min(FaceMatcher::waitingBytes(records.face, cells * kUsualFaces), memory_bytes / 4);
+  memory_bytes -= waiting;
   const uint64_t range_bytes = records.body + kUsualFaces * (records.neighbour + 3 * sizeof(uint64_t));
+  Shares shares{};
+  shares.body_bytes = memory_bytes / 8;
+  shares.face_bytes = memory_bytes / 4;
+  shares.pair_bytes = shares.neighbour_bytes = shares.plane_bytes = shares.side_bytes = memory_bytes / 16;
+  shares.corner_bytes = memory_bytes / 32;
+  // When directions are looked at, no face waits any more. Numbers of points are below eight times that of the cells,
+  // even where each cell has points of its own.
+  shares.direction_bytes = std::min(8 * cells, waiting + memory_bytes / 32);
   // Places in a range are of 32 bits.
-  const auto range_cells = std::clamp<uint64_t>(memory_bytes / 2 / range_bytes, 1, uint64_t{1} << 26);
-  return {memory_bytes / 8,  memory_bytes / 16, memory_bytes / 16,
-          memory_bytes / 16, memory_bytes / 4,  range_cells};
+  shares.range_cells = std::clamp<uint64_t>(memory_bytes / 2 / range_bytes, 1, uint64_t{1} << 26);
+  return shares;
 }
 
 CellSlopes::~CellSlopes() = default;
@@ -234,28 +313,28 @@ void CellSlopes::addFaces(const GatheredCells& cells) {
     addNeighbour(cell, cells.numbers[neighbour], of_cells_[neighbour].centre,
                  std::as_bytes(valuesOf(cells, neighbour)));
   };
-  faces_->add(
-      list_.corners,
-      {[&](size_t n, std::span<std::byte> to) {
-         const HalfFace face = list_.face(cells, n);
-         put(to.data(),
-             FaceRecord{cells.numbers[face.cell], of_cells_[face.cell].centre, face.inward, face.centre},
-             valuesOf(cells, face.cell));
-       },
-       [&](size_t first, size_t second) {
-         if (cellOf(first) == cellOf(second) ||
-             joinInRange(cells.numbers[cellOf(first)], cells.numbers[cellOf(second)]))
-           return;
-         tellOf(cells.numbers[cellOf(first)], cellOf(second));
-         tellOf(cells.numbers[cellOf(second)], cellOf(first));
-       },
-       [&](std::span<const std::byte> first, size_t second) {
-         const FaceRecord earlier = recordIn<FaceRecord>(first);
-         const uint64_t cell = cells.numbers[cellOf(second)];
-         if (joinInRange(earlier.cell, cell)) return;
-         tellOf(earlier.cell, cellOf(second));
-         addNeighbour(cell, earlier.cell, earlier.centre_of_cell, first.subspan(sizeof(FaceRecord)));
-       }});
+  faces_->add(list_.corners,
+              {[&](size_t n, std::span<std::byte> to) {
+                 const HalfFace face = list_.face(cells, n);
+                 put(to.data(),
+                     recordOf(cells, face, list_.lastOfQuad(cells, n), of_cells_[face.cell].centre),
+                     valuesOf(cells, face.cell));
+               },
+               [&](size_t first, size_t second) {
+                 if (cellOf(first) == cellOf(second) ||
+                     joinInRange(cells.numbers[cellOf(first)], cells.numbers[cellOf(second)]))
+                   return;
+                 tellOf(cells.numbers[cellOf(first)], cellOf(second));
+                 tellOf(cells.numbers[cellOf(second)], cellOf(first));
+               },
+               [&](std::span<const std::byte> first, size_t second) {
+                 const FaceRecord earlier = recordIn<FaceRecord>(first);
+                 const uint64_t cell = cells.numbers[cellOf(second)];
+                 if (joinInRange(earlier.face.cell, cell)) return;
+                 tellOf(earlier.face.cell, cellOf(second));
+                 addNeighbour(cell, earlier.face.cell, earlier.face.centre_of_cell,
+                              first.subspan(sizeof(FaceRecord)));
+               }});
 }
 
 std::span<const float> CellSlopes::valuesOf(const GatheredCells& cells, size_t n) const {
@@ -283,26 +362,31 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, SlabCells slabs
   const uint64_t first_cell = range * range_cells_;
   {
     const TraceScope trace("load cells");
-    cells.load({*bodies_, *pairs_, *neighbours_}, range, first_cell,
+    cells.load({*bodies_, *pairs_, *neighbours_, *sides_}, range, first_cell,
                std::min(range_cells_, cells_ - first_cell));
   }
   const OuterPlanes::OfRange planes = planes_->load(range);
-  std::atomic<uint64_t> splats = 0, degenerate = 0, halved = 0;
+  std::atomic<uint64_t> splats = 0, degenerate = 0, halved = 0, hanging = 0;
   parallelFor(tbb::blocked_range<size_t>(0, cells.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
     NodeSplat splat;
     std::vector<SplatScalar> values(fields_);
-    std::vector<float> own(fields_), others;
-    std::vector<glm::dvec3> steps;
+    std::vector<float> own(fields_);
+    RangeOfCells::Neighbours others;
     std::vector<OuterPlane> of_border;
     std::array<SlabHalf, 2> halves;
-    uint64_t made = 0, flat = 0, cut = 0;
+    uint64_t made = 0, flat = 0, cut = 0, fitted = 0;
     for (size_t n = part.begin(); n < part.end(); ++n) {
       const BodyRecord body = cells.body(n);
       cells.values(n, own);
-      cells.neighbours(n, steps, others);
+      cells.neighbours(n, others);
       if (!(body.body.volume > 0)) ++flat;
-      splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
-      const std::span<const OuterPlane> faces = planes.of(body.cell, of_border);
+      splatOfCell(body.cell, body.body, own, {others.steps, others.values, others.sides}, splat, values);
+      planes.of(body.cell, of_border);
+      fitted += std::erase_if(of_border, [&](const OuterPlane& plane) {
+                  return std::ranges::any_of(others.sides,
+                                             [&](const CellSide& side) { return side.face == plane.point; });
+                }) > 0;
+      const std::span<const OuterPlane> faces = of_border;
       ++made;
       if (slabs == SlabCells::kHalved && halveSlab(faces, splat, values, halves)) {
         ++cut;
@@ -319,30 +403,63 @@ void CellSlopes::makeSplats(size_t range, const TakeSplat& take, SlabCells slabs
     splats += made + cut;
     degenerate += flat;
     halved += cut;
+    hanging += fitted;
   });
   counts.splats += splats;
   counts.degenerate += degenerate;
   counts.halved += halved;
+  counts.hanging += hanging;
 }
 
-PointSums::Counts CellSlopes::finish(const TakeSplat& take, SlabCells slabs, const Progress& progress) {
+PointSums::Counts CellSlopes::finish(const TakeSplat& take, SlabCells slabs, HangingNodes hanging,
+                                     const Progress& progress) {
   list_ = {};
   freeMemory(of_cells_);
   bodies_->close();
   const auto join = [&](std::span<const std::byte> first, std::span<const std::byte> second) {
-    const FaceRecord a = recordIn<FaceRecord>(first), b = recordIn<FaceRecord>(second);
+    const HangingFaces::Face a = recordIn<FaceRecord>(first).face, b = recordIn<FaceRecord>(second).face;
     if (a.cell == b.cell || joinInRange(a.cell, b.cell)) return;
     addNeighbour(a.cell, b.cell, b.centre_of_cell, second.subspan(sizeof(FaceRecord)));
     addNeighbour(b.cell, a.cell, a.centre_of_cell, first.subspan(sizeof(FaceRecord)));
   };
+  const auto ifQuad = [&](const FaceCorners& lowest, std::span<const std::byte> bytes, const auto& use) {
+    const auto record = recordIn<FaceRecord>(bytes);
+    if (hanging == HangingNodes::kFitted && record.last_corner != FaceList::kNoCorner)
+      use(HangingFaces::Corners{lowest[0], lowest[1], lowest[2], record.last_corner}, record.face);
+  };
   faces_->finish(
       join,
-      [&](std::span<const std::byte> bytes) {
-        const auto face = recordIn<FaceRecord>(bytes);
-        planes_->add(face.cell, {face.inward, face.centre, true});
+      [&](const FaceCorners& lowest, std::span<const std::byte> bytes) {
+        const auto record = recordIn<FaceRecord>(bytes);
+        planes_->add(record.face.cell, {record.inward, record.face.centre, true});
+        ifQuad(lowest, bytes, [&](const auto& corners, const auto& face) { hanging_->look(corners, face); });
       },
       progress);
+  if (hanging_->mayHang())
+    faces_->finish([](std::span<const std::byte>, std::span<const std::byte>) {},
+                   [&](const FaceCorners& lowest, std::span<const std::byte> bytes) {
+                     ifQuad(lowest, bytes, [&](const auto& corners, const auto& face) {
+                       hanging_->add(corners, face, bytes.subspan(sizeof(FaceRecord)));
+                     });
+                   },
+                   progress);
   faces_.reset();
+  std::vector<std::byte> record(sizeof(SideRecord));
+  hanging_->finish(
+      [&](const HangingFaces::Face& face, const HangingFaces::Face& other,
+          std::span<const std::byte> values) {
+        const glm::dvec3 inward = face.inward();
+        const double area = glm::length(inward), shared = std::min(area, glm::length(other.inward()));
+        const glm::dvec3 outward = -shared / area * inward;
+        const SideRecord side{face.cell, other.cell, {outward, face.centre, other.centre_of_cell}};
+        record.resize(sizeof side);
+        std::memcpy(record.data(), &side, sizeof side);
+        record.insert(record.end(), values.begin(), values.end());
+        sides_->append(face.cell / range_cells_, record);
+      },
+      progress);
+  hanging_.reset();
+  sides_->close();
   pairs_->close();
   neighbours_->close();
   planes_->close();
@@ -353,6 +470,7 @@ PointSums::Counts CellSlopes::finish(const TakeSplat& take, SlabCells slabs, con
     bodies_->forget(range);
     pairs_->forget(range);
     neighbours_->forget(range);
+    sides_->forget(range);
   }
   return counts;
 }

@@ -4,7 +4,8 @@
 //    cells --+-- bodies, values -----------------------------------> streams by ranges of cells --+
 //            +-- faces --> face_matcher --+-- pairs of a range --------> the same                 +--> splats
 //                                         +-- of others: neighbours ---> the same                 |
-//                                         +-- outer ones --------------> the same               --+
+//                                         +-- single ones -------------> the same                 |
+//                                                  +-- hanging_faces --> neighbours of other sizes --+
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,7 @@
 
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/face_matcher.h"
+#include "preprocess/gather/hanging_faces.h"
 #include "preprocess/gather/outer_planes.h"
 #include "preprocess/gather/point_sums.h"
 #include "stream/base/temporary_files.h"
@@ -31,13 +33,16 @@ class CellSlopes {
 
   /// How a pass shares its memory.
   struct Shares {
-    uint64_t body_bytes, pair_bytes, neighbour_bytes, plane_bytes, face_bytes;
-    uint64_t range_cells;  // that become splats together
+    uint64_t body_bytes, pair_bytes, neighbour_bytes, plane_bytes, face_bytes, side_bytes;
+    uint64_t direction_bytes, corner_bytes;  // of HangingFaces
+    uint64_t range_cells;                    // that become splats together
   };
   static Shares sharesOf(uint64_t cells, size_t fields, uint64_t memory_bytes);
   /// Records, in temporary files.
   struct RecordBytes {
     uint64_t body, face, pair, neighbour;
+    uint64_t corner;  // of a face, in HangingFaces
+    uint64_t side;
   };
   static RecordBytes recordBytes(size_t fields);
 
@@ -45,7 +50,8 @@ class CellSlopes {
   void add(const GatheredCells& cells);
 
   /// Makes the splats. Once, after all cells.
-  PointSums::Counts finish(const TakeSplat& take, SlabCells slabs, const Progress& progress);
+  PointSums::Counts finish(const TakeSplat& take, SlabCells slabs, HangingNodes hanging,
+                           const Progress& progress);
 
  private:
   std::span<const float> valuesOf(const GatheredCells& cells, size_t n) const;
@@ -60,8 +66,9 @@ class CellSlopes {
   const uint64_t cells_;
   const size_t fields_;
   const uint64_t range_cells_;
-  std::unique_ptr<class StreamsFile> bodies_, pairs_, neighbours_;
+  std::unique_ptr<class StreamsFile> bodies_, pairs_, neighbours_, sides_;
   std::unique_ptr<FaceMatcher> faces_;
+  std::unique_ptr<HangingFaces> hanging_;
   std::unique_ptr<OuterPlanes> planes_;
   FaceList list_;
   std::vector<CellBody> of_cells_;  // that are added

@@ -179,7 +179,7 @@ void FaceMatcher::matchStream(size_t stream, const TakePair& pair, const TakeSin
         pair(recordAt(same_hash[n].second), recordAt(same_hash[n + 1].second));
         n += 2;
       } else {
-        single(recordAt(same_hash[n].second));
+        single(same_hash[n].first, recordAt(same_hash[n].second));
         ++n;
       }
     }
@@ -199,8 +199,11 @@ void FaceMatcher::finish(const TakePair& pair, const TakeSingle& single, const P
   for (size_t stream = 0; stream < spilled_->streams(); ++stream) {
     progress.throwIfStopped();
     matchStream(stream, pair, single);
-    spilled_->forget(stream);
   }
+}
+
+void FaceMatcher::forget() {
+  for (size_t stream = 0; stream < spilled_->streams(); ++stream) spilled_->forget(stream);
 }
 
 namespace {
@@ -348,6 +351,16 @@ HalfFace FaceList::face(const GatheredCells& cells, size_t n) const {
       place.cell, faces.subspan(place.at + size_t{1}, faces[place.at]), place.of_plain_cell, {}, {}};
   measure(view.corners, middleOf(cells, place.cell), face);
   return face;
+}
+
+uint64_t FaceList::lastOfQuad(const GatheredCells& cells, size_t n) const {
+  const Place& place = places[n];
+  const std::span<const uint32_t> faces = facesOfCell(cells, place.cell);
+  if (!place.of_plain_cell || faces[place.at] != 4) return kNoCorner;
+  uint64_t last = 0;
+  for (const uint32_t corner : faces.subspan(place.at + size_t{1}, 4))
+    last = std::max(last, cells.cornersOfCell(place.cell)[corner]);
+  return last;
 }
 
 }  // namespace curvisplat

@@ -45,7 +45,7 @@ struct FaceCalls {
 class FaceMatcher {
  public:
   using TakePair = std::function<void(std::span<const std::byte>, std::span<const std::byte>)>;
-  using TakeSingle = std::function<void(std::span<const std::byte>)>;
+  using TakeSingle = std::function<void(const FaceCorners&, std::span<const std::byte>)>;
 
   /// Expects about `faces` faces. Streams keep to `memory_bytes`, beside the faces that wait
   /// (waitingBytes()).
@@ -55,8 +55,10 @@ class FaceMatcher {
   /// Calls for some of the pairs, in this thread. Records are made of the faces that have no second one
   /// among these.
   void add(std::span<const FaceCorners> faces, const FaceCalls& calls);
-  /// The others, and those without another. Once, after all faces.
+  /// The others, and those without another. After all faces; when it is called again, these are the same.
   void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
+  /// Frees the memory of the streams, after finish().
+  void forget();
 
   /// Bytes of the stream that a face takes if it does not wait in memory.
   static uint64_t spilledBytes(size_t record_bytes) { return sizeof(FaceCorners) + record_bytes; }
@@ -118,6 +120,9 @@ class FaceList {
   void assign(const GatheredCells& cells);  // in parallel; keeps the capacity
   /// Face n, measured. Any thread.
   HalfFace face(const GatheredCells& cells, size_t n) const;
+  static constexpr uint64_t kNoCorner = UINT64_MAX;
+  /// The highest corner of face n, if it has four and its cell is plain; otherwise kNoCorner. Positions are not needed.
+  uint64_t lastOfQuad(const GatheredCells& cells, size_t n) const;
 
  private:
   bool assignCell(const GatheredCells& cells, size_t n);

@@ -13,6 +13,13 @@ namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMaxFollowed = uint64_t{1} << 19;
+constexpr uint64_t kCornersOfQuad = 4;
+
+/// The most CellSides of quads with so many corners: a larger face and two smaller ones have eight, as a larger face
+/// and four smaller ones do.
+uint64_t sidesOf(uint64_t corners) {
+  return 8 * corners / (3 * kCornersOfQuad);
+}
 
 }  // namespace
 
@@ -24,6 +31,8 @@ WaitingFaces::WaitingFaces(uint64_t faces, uint64_t range_cells) : range_cells_(
 void WaitingFaces::add(const GatheredCells& cells) {
   list_.assign(cells);
   for (size_t n = 0; n < list_.corners.size(); ++n) {
+    if (const uint64_t last = list_.lastOfQuad(cells, n); last != FaceList::kNoCorner)
+      addQuad(list_.corners[n], last);
     if (!follows(list_.corners[n][0])) continue;
     const uint32_t cell = list_.places[n].cell;
     const uint64_t corners =
@@ -49,6 +58,34 @@ void WaitingFaces::add(const FaceCorners& corners, uint64_t cell, uint32_t corne
   } else {
     free_.push_back(first.entry);
   }
+}
+
+void WaitingFaces::addQuad(const FaceCorners& corners, uint64_t last_corner) {
+  if (!std::ranges::any_of(corners, [&](uint64_t corner) { return followsQuads(corner); }) &&
+      !followsQuads(last_corner))
+    return;
+  const auto [same, is_new] = open_quads_.emplace(corners, last_corner);
+  if (!is_new) open_quads_.erase(same);
+}
+
+/// Counts corners of quads at points where many meet. At the surface of a mesh, three to five do; where cells of two
+/// sizes meet, those of the larger cells do, and those of the smaller ones.
+void WaitingFaces::countHanging(Counts& counts) const {
+  constexpr uint64_t kMany = 6;
+  std::unordered_map<uint64_t, uint64_t> at_points;
+  uint64_t corners_of_quads = 0;
+  const auto use = [&](uint64_t corner) {
+    if (!followsQuads(corner)) return;
+    ++corners_of_quads;
+    ++at_points[corner];
+  };
+  for (const auto& [corners, last] : open_quads_) {
+    for (const uint64_t corner : corners) use(corner);
+    use(last);
+  }
+  for (const auto& [point, quads] : at_points)
+    if (quads >= kMany) counts.hanging += quads << kShareOfQuads;
+  counts.sides = std::min(counts.hanging, sidesOf(corners_of_quads << kShareOfQuads));
 }
 
 uint32_t WaitingFaces::newEntry(const Entry& entry) {
@@ -77,9 +114,10 @@ WaitingFaces::Counts WaitingFaces::counts() const {
     ++counts.outer;
     counts.corners_of_outer += seen.corners;
   }
+  countHanging(counts);
   for (uint64_t* const count :
-       {&counts.spilled, &counts.outer, &counts.corners_of_outer, &counts.found.in_range,
-        &counts.found.across, &counts.found_late.in_range, &counts.found_late.across})
+       {&counts.spilled, &counts.outer, &counts.corners_of_outer, &counts.hanging, &counts.sides,
+        &counts.found.in_range, &counts.found.across, &counts.found_late.in_range, &counts.found_late.across})
     *count <<= share_;
   return counts;
 }
@@ -314,6 +352,16 @@ GatherNeeds GatherCounts::needsOfPoints() const {
   return needs;
 }
 
+/// The corners of outer faces that HangingFaces takes for opposite because several points share its memory.
+uint64_t GatherCounts::takenForHanging() const {
+  if (points_ <= slopes_.direction_bytes) return 0;
+  const auto points = static_cast<double>(points_), places = static_cast<double>(slopes_.direction_bytes);
+  const auto outer = static_cast<double>(faces.outer);
+  constexpr double kOpposite = 0.5;  // the share of all points, in a mesh of one layer
+  const double others = (points / places - 1) * std::min(1.0, outer / points);
+  return static_cast<uint64_t>(kCornersOfQuad * std::min(1.0, kOpposite * others) * outer);
+}
+
 GatherNeeds GatherCounts::needsOfCells() const {
   const CellSlopes::RecordBytes records = CellSlopes::recordBytes(job_.fields);
   const uint64_t ranges = ceilDivided(all_cells_, slopes_.range_cells);
@@ -332,10 +380,14 @@ GatherNeeds GatherCounts::needsOfCells() const {
                                         faces.found.across + faces.found_late.across};
   GatherNeeds needs;
   needs.splats = cells + std::min(cells, faces.outer / 2);
-  needs.beside_splats =
+  const uint64_t matched =
       bodies + ofPairs(all) + inFile(faces.outer * OuterPlanes::bytesOfPlane(), slopes_.plane_bytes);
-  // The last faces are matched before the first splat.
-  needs.before_splats = spilled + std::max(bodies + ofPairs(faces.found) + ofCorners(), needs.beside_splats);
+  const uint64_t at_corners = HangingFaces::bytesInFile((faces.hanging + takenForHanging()) * records.corner,
+                                                        ranges, slopes_.corner_bytes);
+  needs.beside_splats = matched + inFile(faces.sides * records.side, slopes_.side_bytes);
+  // The last faces are matched before the first splat; then those of other sizes are found.
+  needs.before_splats = std::max({spilled + bodies + ofPairs(faces.found) + ofCorners(),
+                                  spilled + matched + at_corners, needs.beside_splats + at_corners});
   return needs;
 }
 
@@ -367,6 +419,8 @@ GatherNeeds boundOfGather(const MeshReader& reader, const GatherJob& job) {
                          PointSums::bytesOfWaiting(corners_of_cell, words_of_cell, job.fields);
   counts.sum_file_bytes = reader.points() * SumPages::bytesOfPoint(job.fields, momentCount(job.fields));
   counts.faces.spilled = counts.faces.outer = counts.faces.found.across = ofMesh(sample.faces);
+  counts.faces.hanging = kCornersOfQuad * counts.faces.outer;
+  counts.faces.sides = sidesOf(counts.faces.hanging);
   counts.faces.corners_of_outer =
       counts.faces.outer * std::min(corners_of_cell, PointBorders::kMaxPlanesOfFace);
   return counts.needs();

@@ -25,13 +25,15 @@ class WaitingFaces {
   WaitingFaces(uint64_t faces, uint64_t range_cells);
 
   /// Whether cells with this corner have faces that are followed.
-  bool follows(uint64_t corner) const { return share_ == 0 || (corner * kMix) >> (64 - share_) == 0; }
+  bool follows(uint64_t corner) const { return isAmong(corner, share_); }
   /// The faces of cells that have such corners, in the mesh's order. Positions are not needed.
   void add(const GatheredCells& cells);
 
   struct Counts {
     uint64_t spilled = 0;                      // those that wait at the end, too
     uint64_t outer = 0, corners_of_outer = 0;  // that have planes of them, in points
+    uint64_t hanging = 0;                      // corners of quads at which others may lie against them
+    uint64_t sides = 0;                        // CellSides there
     struct Pairs {
       uint64_t in_range = 0, across = 0;  // of cells of one range; of two
     };
@@ -42,6 +44,12 @@ class WaitingFaces {
 
  private:
   static constexpr uint64_t kMix = 0x9e3779b97f4a7c15;
+  static constexpr unsigned kShareOfQuads =
+      2;  // beside share_: a quad may be followed for each of its corners
+  static bool isAmong(uint64_t corner, unsigned share) {
+    return share == 0 || (corner * kMix) >> (64 - share) == 0;
+  }
+  bool followsQuads(uint64_t corner) const { return isAmong(corner, share_ + kShareOfQuads); }
   static constexpr uint32_t kSpilled = UINT32_MAX;
   struct Seen {
     uint64_t cell;
@@ -60,6 +68,8 @@ class WaitingFaces {
     bool is_second;  // its first one is on disk; it is counted already
   };
   void add(const FaceCorners& corners, uint64_t cell, uint32_t corners_of_cell);
+  void addQuad(const FaceCorners& corners, uint64_t last_corner);
+  void countHanging(Counts& counts) const;
   uint32_t newEntry(const Entry& entry);
 
   const uint64_t range_cells_;
@@ -69,7 +79,9 @@ class WaitingFaces {
   std::vector<uint32_t> free_;
   uint32_t next_to_spill_ = 0;
   std::unordered_map<FaceCorners, Seen, Hash> open_;  // without a second cell so far
-  Counts counts_;                                     // of those that are followed
+  std::unordered_map<FaceCorners, uint64_t, Hash>
+      open_quads_;  // at some corners, and the last corner of each
+  Counts counts_;   // of those that are followed
   FaceList list_;
 };
 
@@ -118,6 +130,7 @@ class GatherCounts {
 
  private:
   uint64_t ofCorners() const;
+  uint64_t takenForHanging() const;
   GatherNeeds needsOfPoints() const;
   GatherNeeds needsOfCells() const;
 

@@ -31,16 +31,21 @@ auto contentOf(const Record& record) {
 /// A face at one number.
 struct Side {
   uint64_t face;
-  glm::dvec3 inward, point;
+  OuterPlane plane;
   bool closed = false;
 };
 
-/// Whether the plane of `side` has the other one's centre in it.
-bool isBeside(const Side& side, const Side& other) {
-  constexpr double kCorners = 4;  // `inward` is one corner's share of the face
-  const double area = glm::length(side.inward);
-  return std::abs(glm::dot(side.inward, other.point - side.point)) <=
-         kApart * area * std::sqrt(kCorners * area);
+/// Whether the plane of a face of this area, with the normal `inward`, has a point in it.
+bool hasInPlane(const OuterPlane& plane, double area, const glm::dvec3& point) {
+  const double length = glm::length(plane.inward);
+  return std::abs(glm::dot(plane.inward, point - plane.point)) <= kApart * length * std::sqrt(area);
+}
+
+/// Whether faces lie against each other, of which `inward` is one of `shares` equal parts.
+bool lieAgainst(const OuterPlane& a, const OuterPlane& b, double shares) {
+  const double of_a = glm::length(a.inward), of_b = glm::length(b.inward);
+  return glm::dot(a.inward, b.inward) <= kOpposite * (of_a * of_b) && hasInPlane(a, shares * of_a, b.point) &&
+         hasInPlane(b, shares * of_b, a.point);
 }
 
 /// Marks the sides that lie against another one; all where very many meet.
@@ -52,13 +57,16 @@ void markClosed(std::span<Side> sides) {
   for (Side& a : sides)
     for (Side& b : sides) {
       if (&b == &a) break;
-      const double lengths = glm::length(a.inward) * glm::length(b.inward);
-      if (!(glm::dot(a.inward, b.inward) <= kOpposite * lengths)) continue;
-      if (isBeside(a, b) && isBeside(b, a)) a.closed = b.closed = true;
+      constexpr double kCorners = 4;  // `inward` is one corner's share of the face
+      if (lieAgainst(a.plane, b.plane, kCorners)) a.closed = b.closed = true;
     }
 }
 
 }  // namespace
+
+bool lieAgainst(const OuterPlane& a, const OuterPlane& b) {
+  return lieAgainst(a, b, 1);
+}
 
 void OuterPlanes::add(uint64_t number, const OuterPlane& plane, uint64_t face) {
   const double area = glm::length(plane.inward);
@@ -93,7 +101,7 @@ void OuterPlanes::leaveOutClosed(const Progress& progress) {
       sides.clear();
       for (; end < records.size() && records[end].number == records[first].number; ++end)
         if (records[end].touches != 0)
-          sides.push_back({records[end].face, vectorOf(records[end].inward), vectorOf(records[end].point)});
+          sides.push_back({records[end].face, {vectorOf(records[end].inward), vectorOf(records[end].point)}});
       markClosed(sides);
       for (const Side& side : sides)
         if (side.closed) closed_.push_back(side.face);
@@ -199,7 +207,7 @@ void PointBorders::finish(const Progress& progress) {
   list_ = {};
   uint64_t face = 0;
   faces_.finish([](std::span<const std::byte>, std::span<const std::byte>) {},
-                [&](std::span<const std::byte> bytes) {
+                [&](const FaceCorners&, std::span<const std::byte> bytes) {
                   FaceRecord record;
                   std::memcpy(static_cast<void*>(&record), bytes.data(), sizeof record);
                   for (uint32_t n = 0; n < record.count; ++n)
@@ -207,6 +215,7 @@ void PointBorders::finish(const Progress& progress) {
                   ++face;
                 },
                 progress);
+  faces_.forget();
   planes_.close();
   planes_.leaveOutClosed(progress);
 }

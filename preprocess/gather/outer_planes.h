@@ -60,6 +60,10 @@ class OuterPlanes {
   std::vector<uint64_t> closed_;  // faces, rising
 };
 
+/// Whether two whole faces lie against each other: their normals are opposite, and the plane of each has the other's
+/// centre in it.
+bool lieAgainst(const OuterPlane& a, const OuterPlane& b);
+
 /// Finds which outer faces the splats of points end at: those that have the point and, for points behind,
 /// those of a cell that has the point.
 class PointBorders {

@@ -20,7 +20,7 @@ namespace curvisplat {
 /// Takes a splat and its values, one for each field. Several threads call it at once.
 using TakeSplat = std::function<void(const NodeSplat&, std::span<const SplatScalar>)>;
 
-/// Whether splats of points are fitted where nodes hang, by fitAtHangingNode(). Earlier programs did not.
+/// Whether splats are fitted where nodes hang, by fitAtHangingNode() and fitToSizes(). Earlier programs did not.
 enum class HangingNodes { kAsOthers, kFitted };
 
 class PointSums {
@@ -49,7 +49,7 @@ class PointSums {
     uint64_t splats = 0;
     uint64_t degenerate = 0;  // points whose cells have no volume: their splats have no weight
     uint64_t halved = 0;      // cells that became two splats
-    uint64_t hanging = 0;     // points that were fitted where nodes hang
+    uint64_t hanging = 0;     // points or cells that were fitted where nodes hang
   };
   /// Makes the splats and passes each to `take`. Call it once, after all cells have been added. Throws Error
   /// if the disk fails, Interrupted once `progress` is stopped.

@@ -292,7 +292,7 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
   if (cells) {
     CellSlopes slopes(reader.cells(), fields, half, scratch_);
     gather.forEach([&](const GatheredCells& some) { slopes.add(some); });
-    slopes.finish(take, SlabCells::kWhole, progress);
+    slopes.finish(take, SlabCells::kWhole, HangingNodes::kAsOthers, progress);
   } else {
     PointSums sums(reader.points(), reader.cells(), fields, half, scratch_);
     gather.forEach([&](const GatheredCells& some) { sums.add(some); });

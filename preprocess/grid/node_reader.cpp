@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <span>
 
@@ -155,6 +156,10 @@ NodeReader::NodeReader(const GridSource& source, std::vector<uint32_t> scalars,
 
 BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out) const {
   readBox(*source_, block, box, scalars_, out);
+  if (of_any_value_ && blank_value_)
+    for (std::vector<float>& scalar : out.scalars)
+      std::replace(scalar.begin(), scalar.end(), static_cast<float>(*blank_value_),
+                   std::numeric_limits<float>::quiet_NaN());
   BlankCounts counts;
   if (centring_ == Centring::kCell) {
     markCells(blank_value_, of_any_value_, out);
@@ -173,7 +178,7 @@ BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out
                          idOfPosition(out.x[first + n], out.y[first + n], out.z[first + n]), blank_value_);
     };
 
-    if (blank_value_) {
+    if (blank_value_ && !of_any_value_) {
       const auto wanted = static_cast<float>(*blank_value_);
       for (const std::vector<float>& scalar : out.scalars) {
         const std::span<const float> values(&scalar[first], count);

@@ -52,9 +52,11 @@ class NodeReader {
   /// `scalars`: indices into source.description().scalars. `source` must outlive the reader. Throws Error if
   /// node-centred and cell-centred scalars are mixed.
   NodeReader(const GridSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value);
-  /// Blanks a sample only where none of the scalars has a value; where some have, the others are not finite.
-  static NodeReader ofAnyValue(const GridSource& source, std::vector<uint32_t> scalars) {
-    NodeReader reader(source, std::move(scalars), std::nullopt);
+  /// Blanks a sample only where none of the scalars has a value; where some have, the others are not finite: NaN
+  /// replaces `blank_value`.
+  static NodeReader ofAnyValue(const GridSource& source, std::vector<uint32_t> scalars,
+                               std::optional<double> blank_value = std::nullopt) {
+    NodeReader reader(source, std::move(scalars), blank_value);
     reader.of_any_value_ = true;
     return reader;
   }

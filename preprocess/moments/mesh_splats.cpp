@@ -15,6 +15,7 @@
 #include "preprocess/shape/merge.h"
 #include "preprocess/shape/sample_range.h"
 #include "preprocess/shape/shape.h"
+#include "stream/model/growth_code.h"
 
 namespace curvisplat {
 namespace {
@@ -133,9 +134,119 @@ void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, 
   }
 }
 
+namespace {
+
+constexpr double kSimilar = 0.7;  // cosine: of one plane
+
+/// An axis of a cell along which some neighbours are larger or smaller.
+struct SizedAxis {
+  glm::dvec3 normal{0.0};
+  /// One side of the axis has the area of those neighbours, and the sum of the logarithms to base 2 of lengths over the cell's.
+  struct End {
+    double area = 0, growth = 0;
+    double mean() const { return area > 0 ? growth / area : 0; }
+  };
+  std::array<End, 2> ends;
+
+  template <typename Of>
+  double difference(const Of& of) const {
+    return of(ends[0].mean()) - of(ends[1].mean());
+  }
+};
+
+std::vector<SizedAxis> axesOf(std::span<const CellSide> sides, const glm::dvec3& centre) {
+  std::vector<SizedAxis> axes;
+  for (const CellSide& side : sides) {
+    const double area = glm::length(side.outward);
+    const glm::dvec3 normal = side.outward / area;
+    const double own = glm::dot(side.face - centre, normal),
+                 other = glm::dot(side.neighbour - side.face, normal);
+    if (!(area > 0 && own > 0 && other > 0)) continue;
+    auto axis = std::ranges::find_if(
+        axes, [&](const SizedAxis& known) { return std::abs(glm::dot(known.normal, normal)) > kSimilar; });
+    if (axis == axes.end()) {
+      if (axes.size() == 3) continue;
+      axis = axes.insert(axes.end(), {normal, {}});
+    }
+    SizedAxis::End& end = axis->ends[glm::dot(axis->normal, normal) > 0 ? 0 : 1];
+    end.area += area;
+    end.growth += area * std::clamp(std::log2(other / own), -1.0, 1.0);
+  }
+  return axes;
+}
+
+/// The growth code of a splat that grows along the normals of some faces, by each. A normal that lies near the plane
+/// of those before it, as that of a prism's third side does, is left out.
+uint32_t growthCodeOf(const std::array<glm::dvec3, 3>& normals, const std::array<double, 3>& growth,
+                      const Splat& splat) {
+  constexpr double kMinLeft = 0.1;  // of the length, beside the axes before it
+  std::array<glm::dvec3, 3> frame{};
+  std::array<double, 3> of_frame{};
+  size_t count = 0;
+  for (size_t n = 0; n < normals.size(); ++n) {
+    const glm::dvec3 whole = normals[n] * splat.factor();
+    glm::dvec3 axis = whole;
+    for (size_t m = 0; m < count; ++m) axis -= glm::dot(frame[m], axis) * frame[m];
+    const double left = glm::length(axis);
+    if (growth[n] == 0 || !(left > kMinLeft * glm::length(whole))) continue;
+    frame[count] = axis / left;
+    of_frame[count++] = growth[n];
+  }
+  return packGrowthCode(frame, of_frame);
+}
+
+/// The growth code of a half of a splat, whose frame is another one.
+uint32_t growthCodeOfHalf(const NodeSplat& whole, const Splat& half) {
+  if (whole.growth_code == kNoGrowth) return kNoGrowth;
+  const CellGrowth of_whole = cellGrowth(whole.growth_code);
+  std::array<glm::dvec3, 3> normals;
+  std::array<double, 3> growth;
+  for (size_t n = 0; n < 3; ++n) {
+    normals[n] = gradientOf(whole.splat, glm::dvec3(of_whole.axis[n]));
+    growth[n] = of_whole.growth[n];
+  }
+  return growthCodeOf(normals, growth, half);
+}
+
+}  // namespace
+
+void fitToSizes(std::span<const CellSide> sides, NodeSplat& of_cell) {
+  Splat& splat = of_cell.splat;
+  const std::vector<SizedAxis> axes = axesOf(sides, splat.position);
+  if (axes.empty()) return;
+  const auto perGrowth = [](double of_larger, double of_smaller) {
+    return [=](double growth) { return growth * (growth > 0 ? of_larger : of_smaller); };
+  };
+  const auto length = perGrowth(kBesideLarger.length, -kBesideSmaller.length);
+  const auto shift = perGrowth(kBesideLarger.shift, kBesideSmaller.shift);
+  const auto skew = perGrowth(kBesideLarger.growth, kBesideSmaller.growth);
+  const glm::dmat3 factor = splat.factor();
+  glm::dmat3 shape = factor * glm::transpose(factor);
+  glm::dvec3 moved(0.0);
+  for (const SizedAxis& axis : axes) {
+    const glm::dvec3 reach = shape * axis.normal;
+    const glm::dvec3 along = reach / std::sqrt(glm::dot(axis.normal, reach));  // from face to face
+    const double longer = length(axis.ends[0].mean()) + length(axis.ends[1].mean());
+    moved += axis.difference(shift) * along;
+    shape += std::expm1(2 * longer) * glm::outerProduct(along, along);
+  }
+  setShape(splat, {shape[0][0], shape[0][1], shape[1][1], shape[0][2], shape[1][2], shape[2][2]},
+           smallestAxis(splat.position));
+  splat.position += moved;
+  std::array<glm::dvec3, 3> normals{};
+  std::array<double, 3> growth{};
+  for (size_t n = 0; n < axes.size(); ++n) {
+    normals[n] = axes[n].normal;
+    growth[n] = axes[n].difference(skew);
+  }
+  of_cell.growth_code = growthCodeOf(normals, growth, splat);
+}
+
 void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own,
                  const CellNeighbours& neighbours, NodeSplat& splat, std::span<SplatScalar> values) {
   setBody(node, body.centre, body.volume, {body.xx, body.xy, body.yy, body.xz, body.yz, body.zz}, splat);
+  if (!neighbours.sides.empty() && body.volume > 0) fitToSizes(neighbours.sides, splat);
+  const glm::dvec3 moved = splat.splat.position - body.centre;
   const size_t fields = own.size();
   std::vector<glm::dvec3> gradients(fields);
   leastSquares(neighbours, own, gradients);
@@ -156,15 +267,14 @@ void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own
     }
     const double second = reach > 0 ? 3 * 2 * rest / reach : 0.0;  // of all three columns
     // Since h = S g, the slope A⁻¹ h is Aᵀ g.
-    values[field] =
-        range.bounded({own[field] + kBend * second, gradients[field] * splat.splat.factor(), 0.0});
+    values[field] = range.bounded({own[field] + kBend * second + glm::dot(gradients[field], moved),
+                                   gradients[field] * splat.splat.factor(), 0.0});
   }
 }
 
 namespace {
 
-constexpr double kSimilar = 0.7;  // cosine: of one plane
-constexpr double kEven = 0.9;     // the length of a mean of unit vectors that are about the same
+constexpr double kEven = 0.9;  // the length of a mean of unit vectors that are about the same
 constexpr size_t kMaxDirections = 16;
 
 /// The planes of a cell or of the cells at a point, those of similar directions as one.
@@ -287,6 +397,7 @@ bool halveSlab(std::span<const OuterPlane> planes, const NodeSplat& whole,
     splat.weight *= 0.5;
     setShape(splat, {shape[0][0], shape[0][1], shape[1][1], shape[0][2], shape[1][2], shape[2][2]},
              smallestAxis(splat.position));
+    half.splat.growth_code = growthCodeOfHalf(whole, splat);
     half.values.assign(values.begin(), values.end());
     for (SplatScalar& value : half.values)
       value.slope = inFrameOf(splat, factor * (value.slope - glm::dot(value.slope, *q) * *q));

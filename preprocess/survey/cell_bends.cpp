@@ -17,6 +17,8 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/joined_axes.h"
+#include "stream/base/error.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 namespace {
@@ -34,6 +36,9 @@ constexpr uint64_t kSmallGrid = 100'000;  // nodes
 // blocks that deviate by more are halved along all axes.
 constexpr double kMaxDeviationOfTiny = 0.3;
 constexpr uint64_t kTinyGrid = 10'000;  // nodes
+// The share of a small grid's block whose nodes lie at the edges of stairs, as an ocean's floor has them: splats reach around
+// these. Blocks that have more are halved along all axes as well.
+constexpr double kMaxStairs = 0.02;
 constexpr uint64_t kLargeGrid = 1'000'000;
 // A large grid's survey takes a few percent of a conversion.
 constexpr uint64_t kSampledNodes = 2'000'000;
@@ -134,6 +139,74 @@ class SecondDifferences {
   std::array<uint64_t, 3> counts_;
 };
 
+/// Whether the cells around a node, by its number in bits along i, j, k, end at no plane: some are missing, and the others are not
+/// those on one side of it.
+bool isAtStairs(unsigned cells) {
+  for (const unsigned side : {0xffu, 0xaau, 0xccu, 0xf0u, 0x55u, 0x33u, 0x0fu, 0u})
+    if (cells == side) return false;
+  return true;
+}
+
+/// How many of a block's inner nodes lie at stairs of blanked ones.
+struct Stairs {
+  uint64_t nodes = 0, at_stairs = 0;
+
+  void add(const NodeArrays& nodes_around, const std::array<size_t, 3>& strides, size_t at) {
+    if (nodes_around.blank[at] != 0) return;
+    ++nodes;
+    unsigned there = 0;
+    for (unsigned cell = 0; cell < 8; ++cell) {
+      bool whole = true;
+      for (unsigned corner = 0; corner < 8; ++corner) {
+        size_t node = at;
+        for (unsigned axis = 0; axis < 3; ++axis)
+          if ((corner >> axis & 1) != 0) node += (cell >> axis & 1) != 0 ? strides[axis] : 0 - strides[axis];
+        whole = whole && nodes_around.blank[node] == 0;
+      }
+      there |= whole ? 1u << cell : 0;
+    }
+    if (isAtStairs(there)) ++at_stairs;
+  }
+  double share() const { return nodes > 0 ? static_cast<double>(at_stairs) / static_cast<double>(nodes) : 0; }
+};
+
+/// The stairs of each block. Nodes are blanked by the grid, and where none of the scalars has a value. Scalars of
+/// cells do not count, and of others the first kMaxScalars, whose values are in memory.
+std::vector<Stairs> stairsOf(const GridSource& source, std::vector<uint32_t> scalars,
+                             std::optional<double> blank_value) {
+  const GridDescription& description = source.description();
+  constexpr size_t kMaxScalars = 16;
+  std::erase_if(scalars, [&](uint32_t n) { return description.scalars.at(n).centring != Centring::kNode; });
+  scalars.resize(std::min(scalars.size(), kMaxScalars));
+  const NodeReader reader = NodeReader::ofAnyValue(source, scalars, blank_value);
+  SlabStream stream(reader, kWindowNodes * slabBytesPerNode(scalars.size()),
+                    cutIntoSlabs(description.blocks, kWindowNodes, kNodeHalo));
+  std::vector<Stairs> of_blocks(description.blocks.size());
+  while (const LoadedSlab* loaded = stream.next()) {
+    const Slab& slab = loaded->slab;
+    const GridBlock& block = description.blocks[slab.block];
+    const WindowStrides strides(slab.window, block.ni);
+    for (uint64_t k = std::max<uint64_t>(slab.box.k0, 1); k < std::min(slab.box.k1, block.nk - 1); ++k)
+      for (uint64_t j = std::max<uint64_t>(slab.box.j0, 1); j < std::min(slab.box.j1, block.nj - 1); ++j)
+        for (uint64_t i = std::max<uint64_t>(slab.box.i0, 1);
+             i < std::min(slab.box.endOfRow(block.ni), block.ni - 1); ++i)
+          of_blocks[slab.block].add(loaded->nodes, {1, strides.row, strides.plane}, strides.at(i, j, k));
+  }
+  return of_blocks;
+}
+
+/// The same, but no stairs where a scalar cannot be read: its conversion says so.
+std::vector<Stairs> stairsIfRead(const GridSource& source, const std::vector<uint32_t>& scalars,
+                                 std::optional<double> blank_value) {
+  try {
+    return stairsOf(source, scalars, blank_value);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    return std::vector<Stairs>(source.description().blocks.size());
+  }
+}
+
 BlockBends sumOf(const GridBlock& block, const LoadedSlab& loaded) {
   const Slab& slab = loaded.slab;
   const WindowStrides strides(slab.window, block.ni);
@@ -233,10 +306,11 @@ class CutChoice {
     }
   }
 
-  /// Halves the cells of blocks that deviate by more than `max` along the axes that are not cut. `most`: nodes.
-  void halveWhole(double max, uint64_t most) {
+  /// Halves the cells of some blocks along the axes that are not cut. `most`: nodes.
+  template <typename IsHalved>
+  void halveWhole(const IsHalved& is_halved, uint64_t most) {
     for (uint32_t block = 0; block < blocks_.size(); ++block) {
-      if (!(bends_[block].deviation() > max)) continue;
+      if (!is_halved(block)) continue;
       for (const uint32_t of_class : classes_[block]) {
         if (of_classes_[of_class] > 1) continue;
         of_classes_[of_class] = 2;
@@ -347,7 +421,8 @@ std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes) {
   return bends;
 }
 
-Refinement refinementByNeed(const GridSource& source) {
+Refinement refinementByNeed(const GridSource& source, const std::vector<uint32_t>& scalars,
+                            std::optional<double> blank_value) {
   const std::vector<GridBlock>& blocks = source.description().blocks;
   const uint64_t nodes = nodesOf(blocks);
   if (nodes > kMaxCutByNeed) return {};
@@ -358,11 +433,18 @@ Refinement refinementByNeed(const GridSource& source) {
   const double max = small ? kMaxDeviationOfSmall : kMaxDeviation;
   const bool shows =
       std::ranges::any_of(bends, [max](const BlockBends& of_block) { return of_block.deviation() > max; });
-  if (!shows && !tiny) return {};
+  const std::vector<Stairs> stairs =
+      nodes <= kSmallGrid ? stairsIfRead(source, scalars, blank_value) : std::vector<Stairs>(blocks.size());
+  const auto is_halved = [&](uint32_t block) {
+    return (tiny && bends[block].deviation() > kMaxDeviationOfTiny) || stairs[block].share() > kMaxStairs;
+  };
+  bool halves = false;
+  for (uint32_t block = 0; block < blocks.size(); ++block) halves |= is_halved(block);
+  if (!shows && !halves) return {};
   const uint64_t most = nodes > kLargeGrid ? nodes + nodes / 2 : 8 * nodes;
   CutChoice choice(blocks, bends, joinedAxes(source), max);
   choice.cutByNeed(most);
-  if (tiny) choice.halveWhole(kMaxDeviationOfTiny, most);
+  choice.halveWhole(is_halved, most);
   return choice.chosen();
 }
 

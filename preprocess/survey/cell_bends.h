@@ -20,6 +20,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,9 +48,11 @@ inline constexpr uint64_t kMaxCutByNeed = 16'000'000;
 
 /// Chooses for each block, along each axis, into 1, 2, 4 or 8 parts its cells should be cut, so that a picture
 /// does not show them (kMaxDeviation), with at most 8 times the nodes, or 1.5 times in grids of more than a
-/// million. Blocks that share the nodes of a face or an edge have as many parts along it. Throws Error if the
-/// grid cannot be read.
-Refinement refinementByNeed(const GridSource& source);
+/// million. Blocks that share the nodes of a face or an edge have as many parts along it. Blocks of
+/// small grids whose drawn nodes end in stairs are halved: nodes are drawn where one of `scalars` has a value other than
+/// `blank_value`. Throws Error if the grid cannot be read.
+Refinement refinementByNeed(const GridSource& source, const std::vector<uint32_t>& scalars = {},
+                            std::optional<double> blank_value = {});
 
 /// A line for users if a picture of the grid will show its cells: what helps. Otherwise empty. `by_need`: whether
 /// refinementByNeed() has chosen its cuts. Looks at some slabs of large grids only. Throws Error if the grid cannot be

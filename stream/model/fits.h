@@ -43,6 +43,13 @@ inline constexpr HangingFit kFitOfOneSide{1.7, 1.53, 2.2}, kFitOfBothSides{-1.25
 /// The first fit takes over from the second between two κ, and the third is the largest that counts.
 inline constexpr double kBothSidesUpTo = 0.18, kOneSideFrom = 0.22, kMostAside = 0.5;
 
+/// [no script] Splats of a mesh's cells beside a cell twice as long, and beside one half as long (preprocess/moments/mesh_splats.h): the
+/// logarithm of the factor of the length; drift and growth towards the larger cell.
+struct SizeFit {
+  double length, shift, growth;
+};
+inline constexpr SizeFit kBesideLarger{0.19, 0.125, 0.468}, kBesideSmaller{-0.039, 0.019, 0.144};
+
 /// [no script] The share of a whole cell's stretch, s - 1, that a half cell at a border has.
 inline constexpr double kStretchAtBorder = 0.62;
 

@@ -334,7 +334,8 @@ TEST_F(RefineCommand, CutsByNeed) {
   const ProgramResult by_need = convert_ring("auto.splats", {"--threads", "1"});
   EXPECT_EQ(by_need.status, 0);
   expectSays(by_need.err,
-             "note: cells that bend or grow steeply are cut: 180 nodes of the files become 315; --refine 1");
+             "note: cells that bend or grow steeply, or end in stairs, are cut: 180 nodes of the files "
+             "become 315; --refine 1");
   EXPECT_EQ(by_need.err.find("cells differ"), std::string::npos);
   const nlohmann::json cut = manifest("auto.splats");
   EXPECT_FALSE(cut.contains("refined"));

@@ -235,6 +235,15 @@ TEST_F(GatherForecast, IsRightForCellsInARandomOrder) {
   expectForecast("shuffled tetrahedra", shuffled(tetrahedraOf(*scene_, 40, 20, 20), 3));
 }
 
+TEST_F(GatherForecast, IsRightForCellsOfTwoSizes) {
+  expectForecast("parted cube", partedCube(20));
+  expectForecast("shuffled parted cube", shuffled(partedCube(20), 3));
+}
+
+TEST_F(GatherForecast, IsRightForALayer) {
+  expectForecast("layer", hexahedraOf(*scene_, 400, 400, 1));
+}
+
 TEST_F(GatherForecast, IsRightForPieces) {
   // Cells of a piece lie beside one another; points that pieces share are kept in memory.
   const ArrayPiece hexahedra = hexahedraOf(*scene_, 80, 40, 40);

@@ -198,20 +198,22 @@ TEST_F(MeshAddition, OnlyWhatTheCacheDrawsNeedsTheScalar) {
 
 TEST_F(MeshAddition, HangingNodesAreFittedAsTheCacheIs) {
   const std::vector<ArrayPiece> joint{unitBox(0, 4), unitBox(1, 8)};
-  expectAddition(joint, false);
-  const TwoOfEach source(joint);
-  const auto cache = convertAt(source, "fitted", {0});
-  EXPECT_EQ(CacheReader(cache).manifest().stretch, kHangingNodes);
-  EXPECT_EQ(CacheReader(convertAt(TwoOfEach({hexahedra_}), "none", {0})).manifest().stretch, "");
-  // A cache of an earlier program is expected to have splats as they come from dual cells, which lie elsewhere.
-  Manifest manifest = CacheReader(cache).manifest();
-  manifest.stretch = "";
-  std::ofstream(cache / "manifest.json", std::ios::binary) << manifest.toJson();
-  AddScalarOptions options;
-  options.cache = cache;
-  options.scalars = {2};
-  Progress progress;
-  expectSays(curvisplat::errorOf([&] { addScalars(source, options, progress); }), "another position");
+  const TwoOfEach source(joint), even({hexahedra_});
+  for (const uint32_t scalar : {0u, 1u}) {
+    expectAddition(joint, scalar == 1);
+    const auto cache = convertAt(source, fmt::format("fitted{}", scalar), {scalar});
+    EXPECT_EQ(CacheReader(cache).manifest().stretch, kHangingNodes);
+    EXPECT_EQ(CacheReader(convertAt(even, fmt::format("none{}", scalar), {scalar})).manifest().stretch, "");
+    // A cache of an earlier program is expected to have splats as they come from the cells, which lie elsewhere.
+    Manifest manifest = CacheReader(cache).manifest();
+    manifest.stretch = "";
+    std::ofstream(cache / "manifest.json", std::ios::binary) << manifest.toJson();
+    AddScalarOptions options;
+    options.cache = cache;
+    options.scalars = {scalar + 2};
+    Progress progress;
+    expectSays(curvisplat::errorOf([&] { addScalars(source, options, progress); }), "another position");
+  }
 }
 
 TEST_F(MeshAddition, AnotherMeshIsRefused) {

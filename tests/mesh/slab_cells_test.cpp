@@ -1,12 +1,16 @@
 // Meshes of one layer of cells, as two-dimensional cases are written: each cell is two splats, one at each face.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <map>
 #include <mutex>
+#include <numbers>
+#include <span>
 #include <vector>
 
 #include "preprocess/convert/convert.h"
@@ -14,6 +18,7 @@
 #include "preprocess/moments/mesh_splats.h"
 #include "preprocess/shape/shape.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/model/growth_code.h"
 #include "tests/reference/array_mesh.h"
 #include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
@@ -184,6 +189,117 @@ TEST_F(SlabCells, HaveTheSameBytesForAnyThreadsMemoryAndRanks) {
                       {.threads = 2, .mesh_bytes = 200'000},
                       {.threads = 1, .bucket_splats = 3000, .ranks = 2},
                       {.threads = 1, .bucket_splats = 3000, .ranks = 3}});
+  }
+}
+
+using CellsOfTwoSizes = SlabCells;
+
+TEST_F(CellsOfTwoSizes, KnowOneAnotherAndTheField) {
+  const uint64_t n = 5;
+  const ArrayMesh mesh({partedCube(n)});
+  double volume = 0;
+  size_t inside = 0;
+  for (const auto& [number, made] : splatsOf(mesh)) {
+    const Splat& splat = made.node.splat;
+    volume += splat.weight;
+    const glm::dvec3 at = splat.position;
+    const double edge = std::min({at.x, at.y, at.z, 2 * n - at.x, 2 * n - at.y, 2 * n - at.z});
+    if (edge < 2) continue;
+    ++inside;
+    EXPECT_EQ(made.node.border_code, kNoBorder) << number;
+    // The mean where the splat is, which lies off its cell's middle, and all of the slope.
+    EXPECT_NEAR(made.value.mean, 3 + at.x - 2 * at.y + 0.5 * at.z, 1e-5) << number;
+    EXPECT_LT(glm::distance(gradientOf(splat, made.value.slope), glm::dvec3(1, -2, 0.5)), 1e-5) << number;
+  }
+  EXPECT_NEAR(volume, 8 * n * n * n, 1e-9);
+  EXPECT_GT(inside, 100u);
+}
+
+TEST_F(CellsOfTwoSizes, DoNotKnowThoseThatTheyTouchAtACornerOnly) {
+  // In an L, the cell of 2 ends at the edge x = y = 0, and the cells of 1 at y = -1 begin there on the other side.
+  std::vector<Box> boxes{{{2, 3, 1}, 2}};
+  for (uint64_t y = 2; y < 5; ++y)
+    for (uint64_t z = 1; z < 3; ++z) boxes.push_back({{4, y, z}, 1});
+  const auto with = splatsOf(ArrayMesh({boxesOf(boxes)}));
+  boxes.erase(boxes.begin());
+  const auto without = splatsOf(ArrayMesh({boxesOf(boxes)}));
+  for (const uint64_t cell : {0u, 1u}) {  // at y = -1
+    const NodeSplat& beside = with.at(cell + 1).node;
+    const NodeSplat& alone = without.at(cell).node;
+    EXPECT_EQ(beside.border_code, alone.border_code) << "ends at all of its outer faces";
+    EXPECT_EQ(beside.growth_code, kNoGrowth);
+    EXPECT_EQ(beside.splat.position, alone.splat.position);
+    EXPECT_EQ(with.at(cell + 1).value.mean, without.at(cell).value.mean);
+  }
+  EXPECT_NE(with.at(3).node.growth_code, kNoGrowth) << "this one lies against it";
+}
+
+TEST_F(CellsOfTwoSizes, HaveTheSameBytesForAnyThreadsMemoryAndRanks) {
+  const ArrayPiece cube = partedCube(12);
+  for (const ArrayMesh& mesh :
+       {ArrayMesh({shuffled(cube, 3)}), ArrayMesh(split(cube, 3, [](size_t cell) { return cell / 50 % 3; }))})
+    expectSameCaches(mesh, options(),
+                     {{.threads = 1, .mesh_bytes = 1'000'000},
+                      {.threads = 2, .mesh_bytes = 300'000},
+                      {.threads = 1, .bucket_splats = 3000, .ranks = 2}});
+}
+
+/// A cell's splat of length 1, or as `shape` says, beside cells of twice the length in these directions.
+NodeSplat besideLarger(std::span<const glm::dvec3> directions, const CellBody& shape) {
+  std::vector<CellSide> sides;
+  for (const glm::dvec3& direction : directions)
+    sides.push_back({direction, shape.centre + 0.5 * direction, shape.centre + 1.5 * direction});
+  NodeSplat splat;
+  SplatScalar value;
+  splatOfCell(0, shape, std::array{1.0f}, {{}, {}, sides}, splat, {&value, 1});
+  return splat;
+}
+
+TEST(FitToSizes, GrowsPrismsAlongTheirTriangles) {
+  // Three directions of one plane are two axes at most.
+  const CellBody body{.volume = 1, .centre = glm::dvec3(0), .xx = 1, .yy = 1, .zz = 1};
+  for (const double turn : {0.0, 0.3, 1.1, 2.0}) {
+    std::vector<glm::dvec3> directions;
+    for (int n = 0; n < 3; ++n) {
+      const double angle = turn + n * 2 * std::numbers::pi / 3;
+      directions.emplace_back(std::cos(angle), std::sin(angle), 0);
+    }
+    const uint32_t code = besideLarger(directions, body).growth_code;
+    ASSERT_TRUE(isPossibleGrowthCode(code));
+    const CellGrowth growth = cellGrowth(code);
+    double along_prism = 0;
+    for (size_t n = 0; n < 3; ++n)
+      if (growth.growth[n] != 0) along_prism = std::max(along_prism, std::abs(double{growth.axis[n].z}));
+    EXPECT_NE(code, kNoGrowth);
+    EXPECT_LT(along_prism, 0.1) << turn;
+  }
+}
+
+TEST(FitToSizes, GrowsHalvesAcrossTheSameFaces) {
+  // A layer whose cells lean over by more than their height: halves have another frame.
+  const glm::dmat3 cell(1, 0, 0, 0, 1, 0, 1.2, 0.8, 0.7);
+  const glm::dmat3 shape = cell * glm::transpose(cell);
+  const CellBody body{.volume = glm::determinant(cell),
+                      .centre = glm::dvec3(0),
+                      .xx = shape[0][0],
+                      .xy = shape[0][1],
+                      .yy = shape[1][1],
+                      .xz = shape[0][2],
+                      .yz = shape[1][2],
+                      .zz = shape[2][2]};
+  const glm::dvec3 normal = glm::normalize(glm::cross(cell[1], cell[2]));
+  const NodeSplat whole = besideLarger(std::array{normal}, body);
+  const std::vector<OuterPlane> planes{{{0, 0, 1}, {-0.6, -0.4, -0.35}}, {{0, 0, -1}, {0.6, 0.4, 0.35}}};
+  std::array<SlabHalf, 2> halves;
+  ASSERT_TRUE(halveSlab(planes, whole, {}, halves));
+  for (const SlabHalf& half : halves) {
+    const CellGrowth growth = cellGrowth(half.splat.growth_code);
+    const size_t most =
+        static_cast<size_t>(std::ranges::max_element(growth.growth, {}, [](float g) { return std::abs(g); }) -
+                            growth.growth.begin());
+    EXPECT_GT(std::abs(growth.growth[most]), 0.3f);
+    const glm::dvec3 across = glm::normalize(gradientOf(half.splat.splat, glm::dvec3(growth.axis[most])));
+    EXPECT_GT(std::abs(glm::dot(across, normal)), 0.99);
   }
 }
 

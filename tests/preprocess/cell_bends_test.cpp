@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -11,12 +12,14 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/grid/grid_views.h"
 #include "preprocess/grid/parallel.h"
 #include "preprocess/survey/joined_axes.h"
+#include "stream/base/error.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/same_caches.h"
 #include "tests/support/temporary_folder.h"
@@ -194,6 +197,70 @@ TEST(RefinementByNeed, HalvesAllCellsOfFewThatMeetAtAnAngle) {
   EXPECT_EQ(found.ofBlock(1), (CellCuts{2, 2, 2}));
   EXPECT_EQ(found.ofBlock(2), kWholeCells);
   EXPECT_FALSE(refinementByNeed(*many).cutsCells());
+}
+
+TEST(RefinementByNeed, HalvesCellsOfSmallBlocksThatEndInStairs) {
+  enum class Land { kStairs, kCliff, kOneHole };
+  const auto sea = [](Land land, uint64_t n, bool by_value, float value) {
+    GridBlock block = gridBlock(n, n, n);
+    block.has_blanking = true;
+    return FunctionGridSource({block}, 1, [=](const GridNode& node) {
+      const glm::dvec3 at(static_cast<double>(node.i), static_cast<double>(node.j),
+                          static_cast<double>(node.k));
+      const bool is_land = land == Land::kStairs  ? 3 * node.k < node.i + node.j
+                           : land == Land::kCliff ? node.i < n / 2
+                                                  : node.i == 5 && node.j == 5 && node.k == 5;
+      return NodeValues{at, {is_land && by_value ? value : 1.0f}, is_land && !by_value};
+    });
+  };
+  const CellCuts halves{2, 2, 2};
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  for (const bool by_value : {false, true}) {
+    EXPECT_EQ(refinementByNeed(sea(Land::kStairs, 16, by_value, kNone), {0}).ofBlock(0), halves);
+    EXPECT_EQ(refinementByNeed(sea(Land::kCliff, 16, by_value, kNone), {0}).ofBlock(0), kWholeCells);
+    EXPECT_EQ(refinementByNeed(sea(Land::kOneHole, 24, by_value, kNone), {0}).ofBlock(0), kWholeCells);
+    EXPECT_EQ(refinementByNeed(sea(Land::kStairs, 50, by_value, kNone), {0}).ofBlock(0), kWholeCells);
+  }
+  EXPECT_EQ(refinementByNeed(sea(Land::kStairs, 16, true, -99), {0}).ofBlock(0), kWholeCells);
+  EXPECT_EQ(refinementByNeed(sea(Land::kStairs, 16, true, -99), {0}, -99).ofBlock(0), halves);
+}
+
+/// A scalar of one value everywhere, and one that is 0 here and there.
+std::unique_ptr<FunctionGridSource> withScatteredZeros() {
+  return std::make_unique<FunctionGridSource>(
+      std::vector{gridBlock(16, 16, 16)}, 2, [](const GridNode& node) {
+        const bool is_zero = (node.i * 7 + node.j * 5 + node.k * 3) % 11 == 0;
+        return NodeValues{
+            glm::dvec3(static_cast<double>(node.i), static_cast<double>(node.j), static_cast<double>(node.k)),
+            {1.0f, is_zero ? 0.0f : 1.0f}};
+      });
+}
+
+TEST(RefinementByNeed, LooksForStairsWhereNoScalarHasAValue) {
+  const auto grid = withScatteredZeros();
+  EXPECT_EQ(refinementByNeed(*grid, {0}, 0).ofBlock(0), kWholeCells);
+  EXPECT_EQ(refinementByNeed(*grid, {0, 1}, 0).ofBlock(0), kWholeCells);
+  EXPECT_EQ(refinementByNeed(*grid, {1}, 0).ofBlock(0), (CellCuts{2, 2, 2}));
+  EXPECT_EQ(refinementByNeed(*grid, {1}).ofBlock(0), kWholeCells);
+}
+
+/// A grid whose second scalar cannot be read.
+class DamagedGrid : public GridSource {
+ public:
+  const GridDescription& description() const override { return grid_->description(); }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    if (std::ranges::count(scalars, 1u) > 0) throw Error("damaged");
+    grid_->read(block, box, scalars, out);
+  }
+
+ private:
+  std::unique_ptr<FunctionGridSource> grid_ = withScatteredZeros();
+};
+
+TEST(RefinementByNeed, LeavesDamagedScalarsToTheConversion) {
+  for (const std::vector<uint32_t>& scalars : {std::vector<uint32_t>{0}, {1}, {0, 1}})
+    EXPECT_FALSE(refinementByNeed(DamagedGrid(), scalars).cutsCells());
 }
 
 TEST(RefinementByNeed, KeepsToItsBounds) {

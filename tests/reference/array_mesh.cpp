@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <random>
 
@@ -188,6 +189,40 @@ ArrayPiece shuffled(const ArrayPiece& piece, uint32_t seed) {
     appendCell(
         piece, cells[n], [&](uint64_t corner) { return number[corner]; }, n % 2 != 0, out);
   return out;
+}
+
+ArrayPiece boxesOf(const std::vector<Box>& boxes) {
+  ArrayPiece piece;
+  std::map<std::array<uint64_t, 3>, uint64_t> numbers;
+  for (const Box& box : boxes) {
+    std::array<uint64_t, 8> corners;
+    for (size_t corner = 0; corner < 8; ++corner) {
+      std::array<uint64_t, 3> at = box.low;
+      const size_t ring = corner % 4;
+      at[0] += ring == 1 || ring == 2 ? box.size : 0;
+      at[1] += ring >= 2 ? box.size : 0;
+      at[2] += corner >= 4 ? box.size : 0;
+      const auto [found, is_new] = numbers.emplace(at, piece.points.size());
+      if (is_new) piece.points.push_back(glm::dvec3(at[0], at[1], at[2]));
+      corners[corner] = found->second;
+    }
+    piece.cells.append(CellKind::kHexahedron, corners);
+  }
+  setValues(piece, [](const glm::dvec3& x) { return 3 + x.x - 2 * x.y + 0.5 * x.z; });
+  return piece;
+}
+
+ArrayPiece partedCube(uint64_t n) {
+  std::vector<Box> boxes;
+  for (uint64_t cell = 0; cell < n * n * n; ++cell) {
+    const std::array<uint64_t, 3> low{2 * (cell % n), 2 * (cell / n % n), 2 * (cell / n / n)};
+    if ((low[0] + low[1] + low[2]) % 4 != 0)
+      boxes.push_back({low, 2});
+    else
+      for (uint64_t part = 0; part < 8; ++part)
+        boxes.push_back({{low[0] + part % 2, low[1] + part / 2 % 2, low[2] + part / 4}, 1});
+  }
+  return boxesOf(boxes);
 }
 
 std::vector<ArrayPiece> split(const ArrayPiece& piece, size_t pieces,

@@ -1,6 +1,7 @@
 // Unstructured grids in memory, for tests: of any cells, and the half-annulus in tetrahedra and in hexahedra.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
@@ -42,6 +43,16 @@ void setValues(ArrayPiece& piece, const std::function<double(const glm::dvec3&)>
 ArrayPiece tetrahedraOf(const Scene& scene, uint64_t nu, uint64_t nv, uint64_t nw);
 /// A scene in nu x nv x nw hexahedra.
 ArrayPiece hexahedraOf(const Scene& scene, uint64_t nu, uint64_t nv, uint64_t nw);
+
+/// A cube, by its lowest corner and its length.
+struct Box {
+  std::array<uint64_t, 3> low;
+  uint64_t size;
+};
+/// Hexahedra that share the points where their corners meet. Values are those of a linear field.
+ArrayPiece boxesOf(const std::vector<Box>& boxes);
+/// n x n x n cells of a cube, each even one of them in eight parts.
+ArrayPiece partedCube(uint64_t n);
 
 /// The same mesh with points and cells in a random order, and corners turned the other way round in every second
 /// tetrahedron.

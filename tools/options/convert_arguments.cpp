@@ -199,6 +199,38 @@ class RefinementOnce {
   std::optional<Refinement> found_;  // guarded by mutex_
 };
 
+/// Does what chooseScalars() does, but calls say(note) instead of printing, and throws UsageError.
+template <typename Say>
+std::vector<uint32_t> positionsOf(const ConvertArguments& arguments, const std::vector<std::string>& names,
+                                  const GridDescription& description, const Say& say) {
+  std::vector<uint32_t> stored;
+  std::vector<std::string> words;
+  for (const std::string& name : names) {
+    const bool is_one = isScalar(description, name);  // its name may have commas
+    for (const std::string& part : is_one ? std::vector{name} : splitAtCommas(name))
+      if (part == "all" && !isScalar(description, part))
+        stored = defaultScalars(description, arguments.unusable_scalars);
+      else
+        words.push_back(part);
+  }
+  if (names.empty()) stored = defaultScalars(description, arguments.unusable_scalars);
+  if (words.empty() && !stored.empty()) return stored;
+  for (const std::string& note : notesOnNumbers(description, words)) say(note);
+  for (const uint32_t position : scalarsNamed(description, words))
+    if (std::find(stored.begin(), stored.end(), position) == stored.end()) stored.push_back(position);
+  return stored;
+}
+
+/// The scalars that will be converted; none if a name is wrong: chooseScalars() reports it.
+std::vector<uint32_t> scalarsToConvert(const ConvertArguments& arguments,
+                                       const GridDescription& description) {
+  try {
+    return positionsOf(arguments, arguments.scalars, description, [](const std::string&) {});
+  } catch (const UsageError&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 void takeScalarsFromSolutions(ConvertArguments& arguments) {
@@ -231,7 +263,10 @@ std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments,
   if (const auto refinement = refinementOf(arguments, cache))
     return refinedBy(*refinement, std::move(source), arguments.blank_value);
   const auto parts = parseRefinement("--refine", arguments.refine.value_or(kByNeed));
-  const Refinement refinement = parts ? Refinement(*parts) : refinementByNeed(*source, arguments.threads);
+  const Refinement refinement =
+      parts ? Refinement(*parts)
+            : refinementByNeed(*source, scalarsToConvert(arguments, source->description()), arguments.threads,
+                               arguments.blank_value);
   return refinedBy(refinement, std::move(source), arguments.blank_value);
 }
 
@@ -248,11 +283,12 @@ std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_
   return refined(std::move(grid), refinement, blank_value);
 }
 
-Refinement refinementByNeed(const DataSource& source, unsigned threads) {
+Refinement refinementByNeed(const DataSource& source, const std::vector<uint32_t>& scalars, unsigned threads,
+                            std::optional<double> blank_value) {
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   if (!grid) return {};
   const ConversionThreads bound(threadsFor(threads));
-  Refinement refinement = refinementByNeed(*grid);
+  Refinement refinement = refinementByNeed(*grid, scalars, blank_value);
   returnFreedMemory();
   return refinement;
 }
@@ -267,7 +303,8 @@ std::string noteOnCuts(const GridDescription& description, std::string_view how_
     in_files += (i + 1) * (j + 1) * (k + 1);
   }
   return fmt::format(
-      "cells that bend or grow steeply are cut: {} nodes of the files become {}; {} leaves them whole",
+      "cells that bend or grow steeply, or end in stairs, are cut: {} nodes of the files become {}; {} "
+      "leaves them whole",
       in_files, nodes, how_to_avoid);
 }
 
@@ -296,22 +333,8 @@ std::optional<uint32_t> parseRefinement(const std::string& option, const std::st
 std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
                                     const GridDescription& description) {
   try {
-    std::vector<uint32_t> stored;
-    std::vector<std::string> words;
-    for (const std::string& name : names) {
-      const bool is_one = isScalar(description, name);  // its name may have commas
-      for (const std::string& part : is_one ? std::vector{name} : splitAtCommas(name))
-        if (part == "all" && !isScalar(description, part))
-          stored = defaultScalars(description, arguments.unusable_scalars);
-        else
-          words.push_back(part);
-    }
-    if (names.empty()) stored = defaultScalars(description, arguments.unusable_scalars);
-    if (words.empty() && !stored.empty()) return stored;
-    for (const std::string& note : notesOnNumbers(description, words)) printMessage("note: {}", note);
-    for (const uint32_t position : scalarsNamed(description, words))
-      if (std::find(stored.begin(), stored.end(), position) == stored.end()) stored.push_back(position);
-    return stored;
+    return positionsOf(arguments, names, description,
+                       [](const std::string& note) { printMessage("note: {}", note); });
   } catch (const UsageError& error) {
     throw Error("{}: {}", arguments.grid.grid.string(), error.what());
   }

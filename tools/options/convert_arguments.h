@@ -88,7 +88,8 @@ std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_
 
 /// The refinement by need of a grid (preprocess/survey/cell_bends.h); none of an unstructured one. `threads`: at
 /// most, or 0.
-Refinement refinementByNeed(const DataSource& source, unsigned threads);
+Refinement refinementByNeed(const DataSource& source, const std::vector<uint32_t>& scalars, unsigned threads,
+                            std::optional<double> blank_value);
 /// Says that cells of a structured grid are cut, and that `how_to_avoid` leaves them whole; empty if none are.
 std::string noteOnCuts(const GridDescription& description, std::string_view how_to_avoid = "--refine 1");
 /// Notes on a structured grid's cells, a line each: that they are cut without having been asked for, and that a

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -185,10 +186,14 @@ std::string refinementOf(const py::dict& given_options) {
 /// deleted with it.
 std::unique_ptr<DataSource> refinedAs(const py::dict& given_options, std::unique_ptr<DataSource> source,
                                       std::optional<double> blank_value, const py::object& progress) {
+  std::vector<uint32_t> all(source->description().scalars.size());
+  std::iota(all.begin(), all.end(), 0u);
   const auto threads = py::cast<unsigned>(given_options["threads"]);
   const auto parts = parseRefinement("refine", refinementOf(given_options));
   Refinement refinement(parts.value_or(1));
-  if (!parts) runInterruptibly(progress, [&](Progress&) { refinement = refinementByNeed(*source, threads); });
+  if (!parts)
+    runInterruptibly(progress,
+                     [&](Progress&) { refinement = refinementByNeed(*source, all, threads, blank_value); });
   return refinedBy(refinement, std::move(source), blank_value);
 }
 
