@@ -136,8 +136,8 @@ class CacheView {
   void colourFaces(const std::string& scalar);
   void findIsosurface(const std::string& scalar, std::optional<uint64_t> replaced = {});
   void takeIsosurfaces();
-  void saveMovieTo(const std::filesystem::path& file, ImageSize size,
-                   std::optional<double> frames_per_s = {});
+  void saveMovieTo(const std::filesystem::path& file, ImageSize size, std::optional<double> frames_per_s = {},
+                   uint64_t turn_frames = 0);
   MovieRequest newMovie(const std::filesystem::path& file, std::optional<double> frames_per_s = {}) const;
   void apply(const FilmActions& actions);
   void addKeyFrame(bool replaces);

@@ -167,6 +167,7 @@ void CacheView::saveMovieOf(MovieKind kind) {
   movie_kind_ = kind;
   const MovieRequest movie = newMovie({});
   FileDialog::MovieOffer offer{movie.size, movie.frames_per_s, {}, encodes_movies_};
+  if (kind == MovieKind::kOneTurn) offer.chosen_frames = framesOf(movie);
   // The dialog may outlive this view.
   offer.frames = [film = film_, frames = framesOf(movie), kind](double rate) {
     return kind == MovieKind::kFilm ? film.frames(rate) : frames;
