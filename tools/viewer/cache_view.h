@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <future>
 #include <glm/vec2.hpp>
 #include <map>
@@ -116,6 +117,7 @@ class CacheView {
  private:
   static std::span<const CommandAction<CacheView>> actions();
   void toggle(bool& value);
+  void goToStep(const std::function<void(Playback&)>& move);
   void addPlaneTo(std::vector<ListedPlane>& planes);
   void saveMovieOf(MovieKind kind);
   void copyLater(MovieKind what) { copy_requested_ = what; }
