@@ -399,6 +399,7 @@ void CacheView::loadView(const std::string& name) {
     loadSurfaces(state);
     state.given = state_.given;
     restore(state);
+    panels_.forgetObjects();  // the next view is chosen where this one was
   } catch (const Error& error) {
     reports_.report(error);
   }
