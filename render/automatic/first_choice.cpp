@@ -112,31 +112,49 @@ FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& m
   if (!histogram) return with_map(constantFunction(), maps.sequential);
 
   const BinExtinctions extinctions = extinctionsOf(*histogram);
-  auto [begin, end] = seenInterval(*histogram, extinctions);
   const double zero = histogram->coordinate(0);
-  const double below = zero - begin, above = end - zero;
-  const bool diverging = (map.empty() || isDiverging(map)) && below > 0 && above > 0 &&
-                         std::min(below, above) > kDivergingShare * std::max(below, above);
-  const double low = histogram->scalar(begin), high = histogram->scalar(end);
-  if (diverging) {
-    const double reach = std::max(below, above);
-    begin = zero - reach;
-    end = zero + reach;
-  }
-  parts.asinh = histogram->asinh;
-  const auto rounded = [&](double coordinate) {
-    const double scalar = histogram->scalar(coordinate);
-    const double from =
-        histogram->asinh ? std::abs(scalar - histogram->asinh->centre) + histogram->asinh->width : high - low;
-    return roundedTo(scalar, from, kRangeDigits);
+  bool diverging = false;
+  const auto over = [&](double begin, double end) {
+    const double below = zero - begin, above = end - zero;
+    diverging = (map.empty() || isDiverging(map)) && below > 0 && above > 0 &&
+                std::min(below, above) > kDivergingShare * std::max(below, above);
+    const double low = histogram->scalar(begin), high = histogram->scalar(end);
+    if (diverging) {
+      const double reach = std::max(below, above);
+      begin = zero - reach;
+      end = zero + reach;
+    }
+    parts.asinh = histogram->asinh;
+    const auto rounded = [&](double coordinate) {
+      const double scalar = histogram->scalar(coordinate);
+      const double from = histogram->asinh
+                              ? std::abs(scalar - histogram->asinh->centre) + histogram->asinh->width
+                              : high - low;
+      return roundedTo(scalar, from, kRangeDigits);
+    };
+    parts.range = {rounded(begin), rounded(end)};
+    if (!(parts.range.first < parts.range.second)) return false;
+    parts.opacities = opacityPoints(*histogram, extinctions, histogram->coordinate(parts.range.first),
+                                    histogram->coordinate(parts.range.second));
+    parts = with_map(parts, diverging ? maps.diverging : maps.sequential);
+    parts.opacity_unit = opacityUnitOf(parts.function());
+    return true;
   };
-  parts.range = {rounded(begin), rounded(end)};
-  if (!(parts.range.first < parts.range.second)) return with_map(constantFunction(), maps.sequential);
-  parts.opacities = opacityPoints(*histogram, extinctions, histogram->coordinate(parts.range.first),
-                                  histogram->coordinate(parts.range.second));
-  parts = with_map(parts, diverging ? maps.diverging : maps.sequential);
-  parts.opacity_unit = opacityUnitOf(parts.function());
+  const auto [begin, end] = seenInterval(*histogram, extinctions);
+  if (!over(begin, end)) return with_map(constantFunction(), maps.sequential);
+  const FunctionParts whole = parts;
+  const auto narrower = narrowedInterval(
+      *histogram, seenIn(*histogram, parts.function()), histogram->coordinate(parts.range.first),
+      histogram->coordinate(parts.range.second), diverging ? std::optional(zero) : std::nullopt);
+  if (narrower && !over(narrower->first, narrower->second)) return whole;
   return parts;
+}
+
+BinWeights FirstChoice::seenIn(const VolumeHistogram& histogram, const TransferFunction& function) const {
+  const SeenValues seen = seenValues(samples_, depthsOf(samples_, function), lower_, upper_);
+  BinWeights weights{};
+  for (size_t n = 0; n < seen.values.size(); ++n) weights[histogram.binOf(seen.values[n])] += seen.lights[n];
+  return weights;
 }
 
 double FirstChoice::opacityUnitOf(const TransferFunction& function) const {

@@ -43,6 +43,8 @@ class FirstChoice {
 
  private:
   FunctionParts constantFunction() const;
+  /// How much of the values in each bin is seen.
+  BinWeights seenIn(const VolumeHistogram& histogram, const TransferFunction& function) const;
 
   VariableInfo variable_;
   glm::dvec3 lower_, upper_;  // the data's box, scaled

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 
 #include "render/colour/function_parts.h"
 #include "stream/base/error.h"
@@ -167,22 +168,45 @@ BinExtinctions extinctionsOf(const VolumeHistogram& histogram) {
   return result;
 }
 
-std::pair<double, double> seenInterval(const VolumeHistogram& histogram, const BinExtinctions& extinctions) {
-  double total = 0;
-  for (size_t bin = 0; bin < kBins; ++bin) total += histogram.shares[bin] * extinctions[bin];
-  if (!(total > 0)) return {histogram.low, histogram.high};
+namespace {
+
+/// The coordinate below which `part` of the bins' weights lie, each spread evenly over its bin.
+double percentileOf(const VolumeHistogram& histogram, const BinWeights& weights, double part) {
+  const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
   const double bin_width = (histogram.high - histogram.low) / static_cast<double>(kBins);
-  const auto at = [&](double part) {
-    double sum = 0;
-    for (size_t bin = 0; bin < kBins; ++bin) {
-      const double here = histogram.shares[bin] * extinctions[bin] / total;
-      if (sum + here >= part && here > 0)
-        return histogram.low + (static_cast<double>(bin) + (part - sum) / here) * bin_width;
-      sum += here;
-    }
-    return histogram.high;
-  };
-  return {at(kUnseenPart), at(1 - kUnseenPart)};
+  double sum = 0;
+  for (size_t bin = 0; bin < kBins; ++bin) {
+    const double here = weights[bin] / total;
+    if (sum + here >= part && here > 0)
+      return histogram.low + (static_cast<double>(bin) + (part - sum) / here) * bin_width;
+    sum += here;
+  }
+  return histogram.high;
+}
+
+}  // namespace
+
+std::pair<double, double> seenInterval(const VolumeHistogram& histogram, const BinExtinctions& extinctions) {
+  BinWeights weights;
+  for (size_t bin = 0; bin < kBins; ++bin) weights[bin] = histogram.shares[bin] * extinctions[bin];
+  if (!(std::accumulate(weights.begin(), weights.end(), 0.0) > 0)) return {histogram.low, histogram.high};
+  return {percentileOf(histogram, weights, kUnseenPart), percentileOf(histogram, weights, 1 - kUnseenPart)};
+}
+
+std::optional<std::pair<double, double>> narrowedInterval(const VolumeHistogram& histogram,
+                                                          const BinWeights& seen, double begin, double end,
+                                                          std::optional<double> middle) {
+  constexpr double kBeyond = 0.01, kNarrow = 0.55;
+  if (!(std::accumulate(seen.begin(), seen.end(), 0.0) > 0)) return std::nullopt;
+  double low = std::max(begin, percentileOf(histogram, seen, kBeyond));
+  double high = std::min(end, percentileOf(histogram, seen, 1 - kBeyond));
+  if (middle) {
+    const double reach = std::max(*middle - low, high - *middle);
+    low = *middle - reach;
+    high = *middle + reach;
+  }
+  if (!(low < high && high - low < kNarrow * (end - begin))) return std::nullopt;
+  return std::pair(low, high);
 }
 
 std::vector<OpacityPoint> opacityPoints(const VolumeHistogram& histogram, const BinExtinctions& extinctions,

@@ -65,6 +65,15 @@ BinExtinctions extinctionsOf(const VolumeHistogram& histogram);
 /// The coordinates between which the middle 99 % of the volume lie, weighted by extinction.
 std::pair<double, double> seenInterval(const VolumeHistogram& histogram, const BinExtinctions& extinctions);
 
+using BinWeights = std::array<double, VolumeHistogram::kBins>;
+
+/// The part of the interval [begin, end] in which the middle 98 % of what is seen lie, if that is under 55 % of it: rare values behind
+/// others, which take their light, would leave the picture few of the colours. `seen` [bin]. `middle`: of a diverging map, whose
+/// interval stays symmetric.
+std::optional<std::pair<double, double>> narrowedInterval(const VolumeHistogram& histogram,
+                                                          const BinWeights& seen, double begin, double end,
+                                                          std::optional<double> middle);
+
 /// The opacities over [begin, end] (coordinates of the histogram), for an opacity unit at which the largest
 /// extinction has an optical depth of 2.3, by at most 24 points. Positions are 0..1 from begin to end.
 std::vector<OpacityPoint> opacityPoints(const VolumeHistogram& histogram, const BinExtinctions& extinctions,

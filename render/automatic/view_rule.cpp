@@ -230,7 +230,7 @@ struct SeenBoxes {
 /// Some of the samples, standing for all: enough to compare sides.
 struct FewSamples {
   static constexpr size_t kSamples = 30'000;
-  CoarseSamples samples;       // positions alone
+  CoarseSamples samples;       // positions and values alone
   std::vector<double> depths;  // of what each stands for
   std::vector<double> rare;    // extinction over the largest, 0..1
 
@@ -240,29 +240,29 @@ struct FewSamples {
     for (size_t n = 0; n < all.size(); n += stride) {
       if (!(all.volumes[n] > 0)) continue;
       samples.positions.push_back(all.positions[n]);
+      samples.values.push_back(all.values[n]);
       depths.push_back(all_depths[n] * static_cast<double>(stride));
       rare.push_back(all_depths[n] / all.volumes[n]);
       largest = std::max(largest, rare.back());
     }
     for (double& one : rare) one /= largest > 0 ? largest : 1;
-    samples.values.resize(samples.positions.size());
   }
 };
 
-/// How much is seen of rare values from the side of a camera: over all pixels, the light that each sample
-/// takes of what comes through to it, times its extinction.
-double rareSeen(const FewSamples& few, const Camera& camera) {
+/// Calls take(n, light) with the light that each sample takes, from the side of a camera, of what comes through to it.
+template <typename Take>
+void walkSeen(const FewSamples& few, const Camera& camera, const Take& take) {
   constexpr int kPixels = 48;  // of the longer side: a dozen samples for each
   const SeenSamples seen(few.samples, camera);
   std::array<double, 3> low, reach;
   for (size_t axis = 0; axis < 3; ++axis) {
-    if (seen.places[axis].empty()) return 0;
+    if (seen.places[axis].empty()) return;
     const auto [least, most] = std::minmax_element(seen.places[axis].begin(), seen.places[axis].end());
     low[axis] = *least;
     reach[axis] = *most - *least;
   }
   const double width = std::max(reach[0], reach[1]) / kPixels;
-  if (!(width > 0)) return 0;
+  if (!(width > 0)) return;
   std::vector<uint64_t> order;  // the nearest first
   for (size_t n = 0; n < few.depths.size(); ++n) {
     const double away = reach[2] > 0 ? 1 - (seen.places[2][n] - low[2]) / reach[2] : 0;
@@ -270,7 +270,6 @@ double rareSeen(const FewSamples& few, const Camera& camera) {
   }
   hwy::Sorter()(order.data(), order.size(), hwy::SortAscending());
   std::vector<double> through(size_t{kPixels} * kPixels, 1);
-  double sum = 0;
   for (const uint64_t key : order) {
     const auto n = static_cast<uint32_t>(key);
     const auto pixel = [&](size_t axis) {
@@ -278,10 +277,17 @@ double rareSeen(const FewSamples& few, const Camera& camera) {
     };
     double& left = through[pixel(1) * kPixels + pixel(0)];
     const double passed = std::exp(-few.depths[n] / (width * width));
-    sum += left * (1 - passed) * few.rare[n];
+    take(n, left * (1 - passed) * width * width);
     left *= passed;
   }
-  return sum * width * width;
+}
+
+/// How much is seen of rare values from the side of a camera: over all pixels, the light that each sample
+/// takes, times its extinction.
+double rareSeen(const FewSamples& few, const Camera& camera) {
+  double sum = 0;
+  walkSeen(few, camera, [&](size_t n, double light) { sum += light * few.rare[n]; });
+  return sum;
 }
 
 /// A camera that looks from `from` at the data's middle, z up.
@@ -293,6 +299,20 @@ Camera obliqueCamera(const glm::dvec3& from, const glm::dvec3& lower, const glm:
   camera.view_up = {0, 0, 1};
   return camera;
 }
+
+}  // namespace
+
+SeenValues seenValues(const CoarseSamples& samples, const std::vector<double>& depths,
+                      const glm::dvec3& lower, const glm::dvec3& upper) {
+  const FewSamples few(samples, depths);
+  SeenValues seen{few.samples.values, std::vector<double>(few.samples.size(), 0)};
+  for (const glm::dvec3& octant : kOctants)
+    walkSeen(few, obliqueCamera(octant, lower, upper),
+             [&](size_t n, double light) { seen.lights[n] += light; });
+  return seen;
+}
+
+namespace {
 
 /// Finds a camera, in the view space of `seen`, that shows the points in perspective as large as it can.
 class PerspectiveFit {

@@ -29,6 +29,15 @@ Silhouette widestSilhouette(const CoarseSamples& samples);
 /// `depths` [sample]: volume times extinction, not negative; the unit does not matter. 0 if all are 0.
 double seenArea(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths);
 
+/// Values of some of the samples, and how much is seen of each from the eight oblique sides together; the unit does not matter.
+struct SeenValues {
+  std::vector<float> values;
+  std::vector<double> lights;
+};
+/// `depths` [sample]: volume times extinction, 1/area. `lower`, `upper`: the data's box.
+SeenValues seenValues(const CoarseSamples& samples, const std::vector<double>& depths,
+                      const glm::dvec3& lower, const glm::dvec3& upper);
+
 /// A view as options state it, with few digits.
 struct ViewChoice {
   std::string view = "iso";                              // as Camera::named() knows it

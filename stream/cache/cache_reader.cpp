@@ -425,8 +425,14 @@ size_t CacheReader::variableNamed(std::string_view name) const {
     throw UsageError("{}: {} has values at other samples than {}; it is drawn without them, by --scalar",
                      path().string(), name, listed(own));
   if (variables.empty()) throw UsageError("{}: the cache has no scalars", path().string());
-  throw UsageError("{}: the cache has no scalar '{}'{}; it has {}", path().string(), name,
-                   didYouMean(name, names), listed(names));
+  const std::string meant = didYouMean(name, names);
+  const bool can_grow = meant.empty() && series().steps.size() == 1;
+  throw UsageError(
+      "{}: the cache has no scalar '{}'{}; it has {}{}", path().string(), name, meant, listed(names),
+      can_grow ? fmt::format("; curvisplat convert GRID ... --add-scalar {} --to {} adds one that "
+                             "the grid's files have or that can be computed",
+                             name, path().filename().string())
+               : "");
 }
 
 const fs::path& CacheReader::geometryPath() const {

@@ -35,7 +35,9 @@ class GlobeOptions : public ProgramSuite<GlobeOptions> {
     writeDrift(*folder_ / "drift.nc", "hours since 2001-01-01");
   }
 
-  static void writeSea(const std::filesystem::path& path, double west = -5, double south = 40) {
+  /// `across`: how much values change within a layer.
+  static void writeSea(const std::filesystem::path& path, double west = -5, double south = 40,
+                       double across = 1) {
     NetcdfWriter file(path, NetcdfFileType::kClassic);
     for (const auto& [name, length] : {std::pair("time", 3), {"depth", 5}, {"lat", 17}, {"lon", 21}})
       file.dimension(name, static_cast<size_t>(length));
@@ -47,8 +49,9 @@ class GlobeOptions : public ProgramSuite<GlobeOptions> {
                   [=](const Index& n) { return south + static_cast<double>(n[0]); });
     file.variable("lon", kDouble, {"lon"}, {{"units", "degrees_east"}},
                   [=](const Index& n) { return west + static_cast<double>(n[0]); });
-    file.variable("temp", kDouble, {"time", "depth", "lat", "lon"}, {},
-                  [](const Index& n) { return static_cast<double>(n[0] + n[1] * n[1] + n[2] + 2 * n[3]); });
+    file.variable("temp", kDouble, {"time", "depth", "lat", "lon"}, {}, [=](const Index& n) {
+      return static_cast<double>(n[0] + n[1] * n[1]) + across * static_cast<double>(n[2] + 2 * n[3]);
+    });
   }
 
   /// A float that goes east by a degree in an hour, at 500 m, for twelve hours; and one that stays for three.
@@ -350,6 +353,14 @@ TEST_F(GlobeOptions, WithTheEarthThePictureLooksDownAtTheData) {
     for (size_t n = 0; n < seen.rgba.size(); n += 4) of_data += seen.rgba[n] > seen.rgba[n + 2];
     EXPECT_GT(of_data, 1000) << west;
   }
+}
+
+TEST_F(GlobeOptions, LayersThatAreSeenAsOneAreExplained) {
+  writeSea(*folder_ / "layers.nc", -5, 40, 0);
+  run({"convert", file("layers.nc"), "-o", file("layers.splats")});
+  expectSays(run({"render", file("layers.splats"), "-o", file("a.png"), "--size", "200x160"}).err,
+             "the picture is of one colour; layers above one another are seen as one: convert with "
+             "--vertical-scale 50; or try --range 1%,99%");
 }
 
 TEST_F(GlobeOptions, HeightsAreStretchedAtDrawing) {

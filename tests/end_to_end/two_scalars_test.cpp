@@ -476,7 +476,10 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
     int status;
     std::string words;
   } refused[] = {
-      {{"--opacity-by", "x"}, 2, "--opacity-by: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
+      {{"--opacity-by", "x"},
+       2,
+       "--opacity-by: " + cache +
+           ": the cache has no scalar 'x'; it has s0, s1; curvisplat convert GRID ... --add-scalar x --to "},
       {{"--opacity-range", "0,1"}, 2, "--opacity-range 0,1: needs --opacity-by NAME"},
       {{"--opacity-by", "s0", "--opacity-range", "1,1"},
        2,

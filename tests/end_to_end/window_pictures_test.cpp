@@ -472,6 +472,8 @@ TEST_F(WindowMovie, IsAFileThatPlays) {
   placeOf("picture of 201 x " + std::to_string(pictureSize().height));
   type("movie rate", "10");
   placeOf("movie of pictures a second: 90 pictures, 9.0 s");
+  type("movie pictures", "12");
+  placeOf("movie of pictures a second: 12 pictures, 1.2 s");
   click("file name");
   answer("movie/m.mp4");
   EXPECT_TRUE(isSaved());
@@ -481,7 +483,7 @@ TEST_F(WindowMovie, IsAFileThatPlays) {
                       "stream=width,r_frame_rate,nb_read_frames", "-of", "csv=p=0", "movie/m.mp4"},
                      "/usr/bin/env")
           .wait();
-  EXPECT_EQ(frames.out.substr(0, frames.out.find('\n')), "200,10/1,90") << frames.err;
+  EXPECT_EQ(frames.out.substr(0, frames.out.find('\n')), "200,10/1,12") << frames.err;
 }
 
 TEST_F(WindowMovie, AnEndingThatCannotBeWrittenIsSaid) {

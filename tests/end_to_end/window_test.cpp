@@ -368,6 +368,8 @@ TEST_F(WindowTest, SavesAndLoadsAFunction) {
   const Image band = save();
   EXPECT_LT(difference(band, nothing), 35);
   click("high");
+  moveTo(placeOf("curve", 0.7, 1));
+  EXPECT_TRUE(eventually([] { return hasWidget("point: "); }));
   const Image high = save();
   EXPECT_LT(difference(high, nothing), 35);
   EXPECT_LT(difference(high, band), 35);

@@ -211,6 +211,56 @@ TEST(FirstChoice, LooksFromWhereRareValuesAreSeen) {
   }
 }
 
+/// A cube of dense haze with a core of another value: whatever is seen is haze, and the range is that of the haze.
+TEST(FirstChoice, WhatIsHiddenTakesNoColours) {
+  constexpr int kAlong = 40;
+  const auto lightOf = [](float value, double depth) {
+    CoarseSamples samples;
+    std::vector<double> depths;
+    for (int n = 0; n < kAlong * kAlong * kAlong; ++n) {
+      const glm::dvec3 place =
+          (glm::dvec3(n % kAlong, n / kAlong % kAlong, n / kAlong / kAlong) + 0.5) / double{kAlong};
+      const double volume = 1.0 / (kAlong * kAlong * kAlong);
+      add(samples, glm::distance(place, glm::dvec3(0.5)) < 0.15 ? 1.0f : 0.0f, volume);
+      samples.positions.back() = place;
+      depths.push_back(volume * depth);
+    }
+    const SeenValues seen = seenValues(samples, depths, glm::dvec3(0), glm::dvec3(1));
+    double sum = 0, of_value = 0;
+    for (size_t n = 0; n < seen.values.size(); ++n) {
+      sum += seen.lights[n];
+      if (seen.values[n] == value) of_value += seen.lights[n];
+    }
+    return of_value / sum;
+  };
+  EXPECT_NEAR(lightOf(1, 1e-3), 4 * std::numbers::pi / 3 * std::pow(0.15, 3),
+              0.002);  // its share of the volume
+  EXPECT_LT(lightOf(1, 20), 0.001);
+  EXPECT_GT(lightOf(0, 20), 0.999);
+}
+
+TEST(FirstChoice, ARangeOfWhichLittleIsSeenIsNarrowed) {
+  VolumeHistogram histogram;
+  histogram.low = -1;
+  histogram.high = 3;
+  BinWeights seen{};
+  std::fill_n(seen.begin() + 32, 32, 1.0);    // 0..1
+  std::fill_n(seen.begin() + 64, 64, 0.002);  // 1..3: 0.4 % of it
+  const auto narrowed = narrowedInterval(histogram, seen, -1, 3, std::nullopt);
+  ASSERT_TRUE(narrowed);
+  EXPECT_NEAR(narrowed->first, 0.01, 0.001);
+  EXPECT_NEAR(narrowed->second, 0.994, 0.001);
+  EXPECT_FALSE(narrowedInterval(histogram, seen, 0, 1, std::nullopt));
+  EXPECT_FALSE(narrowedInterval(histogram, {}, -1, 3, std::nullopt));
+  // A diverging map keeps as much on either side of its middle.
+  const auto symmetric = narrowedInterval(histogram, seen, -3, 3, 0);
+  ASSERT_TRUE(symmetric);
+  EXPECT_EQ(symmetric->second, narrowed->second);
+  EXPECT_EQ(symmetric->first, -symmetric->second);
+  std::fill_n(seen.begin() + 64, 64, 0.15);  // a quarter of it
+  EXPECT_FALSE(narrowedInterval(histogram, seen, -1, 3, std::nullopt));
+}
+
 /// A plate across each axis, dense on one of its sides: that side is looked at, but for one below that is only a little denser.
 TEST(FirstChoice, LooksAtTheDenseSideOfAPlate) {
   static constexpr std::string_view kAcross[] = {"+x", "+y", "+z"};

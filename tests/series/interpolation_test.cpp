@@ -169,6 +169,10 @@ TEST_F(InterpolationCommand, DrawsTimesBetweenSteps) {
   EXPECT_TRUE(bytesOfFile(file("late.pfm")) == bytesOfFile(file("s2.pfm")));
   expectSays(late.err, "note: --time 7: the series has times from 0 to 2; step 2 is taken");
 
+  const ProgramResult beyond = runProgram(render("g%d.pfm", {"--steps", "1:9", "--view", "+z"}));
+  EXPECT_TRUE(bytesOfFile(file("g1.pfm")) == bytesOfFile(file("s2.pfm")));
+  expectSays(beyond.err, "note: --steps 1:9: the last step is 2");
+
   draw("f%d.pfm", {"--steps", "all", "--interpolate", "--frames", "5"});
   EXPECT_TRUE(bytesOfFile(file("f0.pfm")) == bytesOfFile(file("s0.pfm")));
   EXPECT_TRUE(bytesOfFile(file("f1.pfm")) == bytesOfFile(file("half.pfm")));

@@ -187,6 +187,13 @@ TEST_F(WindowPlayback, ButtonsUnderThePictureGoToSteps) {
   press("Home");
   placeOf("step 1 of 4");
   const Image again = saveAndCopy();
+  // A step that is chosen while it plays is looked at: playing ends.
+  click("Play");
+  EXPECT_TRUE(eventually([] { return hasWidget("hint Stop"); }));
+  click("Last step");
+  placeOf("step 4 of 4");
+  moveTo(placeOf("Play"));
+  EXPECT_TRUE(eventually([] { return hasWidget("hint Play"); }));
   const auto commands = close();
   ASSERT_EQ(commands.size(), 3u);
   EXPECT_EQ(valueOf(commands[1], "--step"), "3");

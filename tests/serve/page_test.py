@@ -287,7 +287,7 @@ def typed_numbers(tab):
     wanted = lower[0] + 0.3 * (upper[0] - lower[0])
     changes(tab, lambda: set_value(tab, "#slices .at", repr(wanted)), "its place")
     expect(abs(tab.run(f"{PAGE}.state.slices[0].point[0]") - wanted) < 1e-9, "it is where the number says")
-    expect(tab.run("document.querySelector('#slices .at').previousSibling.previousSibling.textContent") == "at x", "the number is of x")
+    expect(tab.run("document.querySelector('#slices .at').previousSibling.previousSibling.textContent") == "x of plane", "the number is of x")
     changes(tab, lambda: set_value(tab, "#slices .triple input:nth-of-type(2)", "1"), "its tilt", "tilted")
     normal = tab.run(f"{PAGE}.state.slices[0].normal")
     expect(max(abs(a - b) for a, b in zip(normal, (0.5 ** 0.5, 0.5 ** 0.5, 0))) < 1e-9, f"a normal of 1, 1, 0: {normal}")
@@ -333,6 +333,13 @@ def editing(tab):
     points = tab.run(f"{PAGE}.state.function.Points.length")
     changes(tab, lambda: tab.drag((x - 40, y - 40), (x - 40, y - 50), steps=5, pause_s=0.03), "a new point", "edited")
     expect(tab.run(f"{PAGE}.state.function.Points.length") == points + 4, "a click adds a point")
+    added = tab.run(f"""(() => {{ const p = {PAGE}.state.function.Points, u = {x - 40} - document.getElementById('curve').getBoundingClientRect().x,
+      width = document.getElementById('curve').clientWidth, [low, high] = [p[0], p[p.length - 4]];
+      let n = 0; while (n < p.length && Math.abs((p[n] - low) / (high - low) * width - u) > 1.5) n += 4;
+      const height = (document.getElementById('curve').clientHeight - 32); return [p[n + 1], height]; }})()""")
+    top = y - tab.run("document.getElementById('curve').clientHeight / 2")
+    up = 1 - (y - 50 - top) / added[1]
+    expect(abs(added[0] - up * up) < 0.02, f"opacities stand on a scale of square roots: {added[0]} at {up}")
     changes(tab, lambda: tab.run(f"""document.getElementById('curve').dispatchEvent(new MouseEvent('dblclick',
       {{clientX: {x - 40}, clientY: {y - 50}, bubbles: true}}))"""), "removing a point")
     expect(tab.run(f"{PAGE}.state.function.Points.length") == points, "a double-click removes it")
@@ -696,10 +703,18 @@ def markers(tab):
     expect(tab.run(shown) == "" and len(tab.run(f"{PAGE}.state.markers")) == 1, "there is nothing in the corner")
     expect(tab.run(f"{PAGE}.errors.length") == 0, "which is no error")
     expect(marker["name"] == "1" and marker["value"] == marker["value"] and len(marker["point"]) == 3, f"a marker: {marker}")
-    names = tab.run("[...document.querySelectorAll('.sign, #markers span')].map(e => e.textContent)")
+    sign_text = tab.run("document.querySelector('.sign').textContent")
+    value = tab.run("document.querySelector('#markers .value').textContent")
     places = tab.run("[...document.querySelectorAll('#markers .place')].map(e => e.textContent)")
     expect(len(places) == 1 and places[0].startswith("x ") and ", z " in places[0], f"its place is in the list: {places}")
-    expect(len(names) == 2 and all(text.startswith(f"1: {marker['scalar']} ") for text in names), f"its texts name its scalar: {names}")
+    expect(sign_text.startswith(f"1: {marker['scalar']} ") and value.startswith(f"{marker['scalar']} "), f"its texts name its scalar: {sign_text}, {value}")
+    tab.click("#markers input")
+    tab.run("document.querySelector('#markers input').select()")
+    for letter in "zip":  # of a text, not keys of the page: z looks from above
+        tab.key(letter)
+    tab.key("\r")
+    wait_for(lambda: tab.run("document.querySelector('.sign').textContent").startswith(f"zip: {marker['scalar']} "), "the sign with the marker's text")
+    tab.run("document.activeElement.blur()")
     sign = "(() => { const r = document.querySelector('.sign').getBoundingClientRect(); return [r.x, r.y + r.height / 2]; })()"
     left, middle = tab.run(sign)
     expect(abs(left - 8 - x) < 4 and abs(middle - y) < 4, f"its sign is at the click: {left - 8}, {middle}, not {x}, {y}")
@@ -710,7 +725,7 @@ def markers(tab):
     shot(tab, "marker")
     # A second one, and how far it is from the first.
     tab.run(f"{PAGE}.state.markers.push({{ ...{PAGE}.state.markers[0], name: '2', point: {PAGE}.state.markers[0].point.map((v, n) => v + [2, 3, 6][n]) }}); showMarkers()")
-    expect(tab.run("document.querySelector('#markers .distance').textContent") == "distance 1 to 2: 7", "the distance between two")
+    expect(tab.run("document.querySelector('#markers .distance').textContent") == "distance zip to 2: 7", "the distance between two")
     tab.run(f"{PAGE}.state.markers.pop(); showMarkers()")
     tab.run("document.querySelector('#markers button').click()")
     expect(tab.run(f"{PAGE}.state.markers.length") == 0 and not tab.run("Boolean(document.querySelector('.sign'))"), "a marker is removed")
@@ -792,6 +807,7 @@ def phone(browser, server):
     shot(tab, "phone_first")
     tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
     tab.run("document.getElementById('add-slice').click()")
+    tab.run("state.markers.push({ name: '1', scalar: 'f', unit: '', value: 1, point: [...cache.upper], block: 0, i: 0, j: 0, k: 0 }); showMarkers()")
     rest(tab)
     wrong = tab.run("""[...document.querySelectorAll('button, select, input, summary')]
       .map(e => e.closest('.check') || e).filter(e => e.offsetParent)
@@ -807,6 +823,7 @@ def phone(browser, server):
     wide_columns = tab.run("""[...document.querySelectorAll('#keys td')].map(e => e.getBoundingClientRect().width)
       .every(width => width > 0.3 * document.getElementById('keys').clientWidth)""")
     expect(wide_columns, "keys and what they do both have space")
+    expect(tab.run("document.getElementById('keys').scrollTop") == 0, "the list begins at its top")
     shot(tab, "phone_keys")
     tab.run("document.getElementById('keys').close()")
     # Its whole label switches a box.

@@ -198,6 +198,13 @@ void noteTimeOutside(const std::string& time, const Series& series, const StepPo
                  last, position.step);
 }
 
+/// Notes that the last of the steps that were asked for is not there.
+void noteStepsBeyond(const std::string& steps, const Series& series) {
+  const std::optional<uint64_t> last = parseSteps("--steps", steps).last;
+  if (last && *last >= series.steps.size())
+    printMessage("note: --steps {}: the last step is {}", steps, series.steps.size() - 1);
+}
+
 }  // namespace
 
 void addStepOptions(CLI::App& command, StepArguments& arguments, const std::string& group) {
@@ -247,6 +254,7 @@ CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& a
   CacheReader cache = CacheReader::ofScalar(path, scalar);
   const StepPosition position = chosenSteps(arguments, cache).front();
   if (arguments.time) noteTimeOutside(*arguments.time, cache.series(), position);
+  if (arguments.steps) noteStepsBeyond(*arguments.steps, cache.series());
   return position == cache.position() ? std::move(cache) : cache.at(position);
 }
 

@@ -57,6 +57,15 @@ std::optional<size_t> pointNear(const EditedFunction& function, const CurveCanva
   return nearest;
 }
 
+/// Returns the share of the volume between a coordinate of the function and its upper end.
+double shareAbove(const std::vector<double>& histogram, double x) {
+  const double at = std::clamp(x, 0.0, 1.0) * static_cast<double>(histogram.size());
+  double share = 0;
+  for (size_t n = 0; n < histogram.size(); ++n)
+    share += histogram[n] * std::clamp(static_cast<double>(n + 1) - at, 0.0, 1.0);
+  return share;
+}
+
 /// Draws the button that takes the mouse for the curve, and returns whether the mouse is over it. It reaches beyond the
 /// canvas, so that points on the canvas's edge can be taken by their outer halves, too.
 bool isReached(const CurveCanvas& canvas) {
@@ -171,8 +180,12 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
   paintHeights(canvas);
   if (const auto shown = dragged_ ? dragged_ : near) {
     const OpacityPoint& point = function.points()[*shown];
-    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove\nShift + drag moves all",
-                      function.scalarAt(point.x), point.opacity);
+    const std::string text = fmt::format(
+        "{:.6g}: opacity {:.4g}; {:.3g} % of the volume above\nright click to remove\n"
+        "Shift + drag moves all",
+        function.scalarAt(point.x), point.opacity, 100 * shareAbove(histogram_, point.x));
+    ImGui::SetTooltip("%s", text.c_str());
+    nameWithoutTab("point: " + text.substr(0, text.find('\n')));
   } else if (over) {
     const double x = static_cast<double>(canvas.xOf(mouse));
     const auto bin = static_cast<size_t>(x * static_cast<double>(histogram_.size()));

@@ -4,17 +4,48 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tools/window/widgets.h"
 
 namespace curvisplat {
 
+namespace {
+
+/// The label that was drawn last, with the space up to the widget behind it, which fills the line up to `end`.
+struct Labelled {
+  ImVec2 lower, upper, widget;
+  float end = 0;
+};
+Labelled last_label;
+
+}  // namespace
+
 void label(const char* text) {
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted(text);
+  last_label.lower = ImGui::GetItemRectMin();
+  const float bottom = ImGui::GetItemRectMax().y;
   ImGui::SameLine(8.5f * ImGui::GetFontSize());
+  last_label.widget = ImGui::GetCursorScreenPos();
+  last_label.upper = {last_label.widget.x, bottom};
+  last_label.end = last_label.widget.x + ImGui::GetContentRegionAvail().x;
   ImGui::SetNextItemWidth(-1);
 }
+
+namespace {
+
+/// Whether the mouse is over the last widget, or over the label of one that fills its line.
+bool isOverWidget() {
+  if (ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled)) return true;
+  const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax(), at = last_label.widget;
+  const bool is_labelled =
+      std::abs(from.x - at.x) < 1 && std::abs(from.y - at.y) < 1 && to.x > last_label.end - 2;
+  return is_labelled && ImGui::IsWindowHovered() &&
+         ImGui::IsMouseHoveringRect(last_label.lower, last_label.upper);
+}
+
+}  // namespace
 
 void commandButton(Command command, PanelActions& actions, const char* text) {
   const CommandInfo& info = infoOf(command);
@@ -111,7 +142,7 @@ void hint(const char* text) {
   static double since_s = 0;
   const ImVec2 from = ImGui::GetItemRectMin(), to = ImGui::GetItemRectMax();
   const bool is_same = hovered.x == from.x && hovered.y == from.y;
-  if (!ImGui::IsItemHovered(ImGuiHoveredFlags_AllowWhenDisabled) || ImGui::IsItemActive()) {
+  if (!isOverWidget() || ImGui::IsItemActive()) {
     if (is_same) hovered = {-1, -1};
     return;
   }
@@ -126,7 +157,9 @@ void hint(const char* text) {
   const float below = to.y + style.ItemSpacing.y;
   ImGui::SetNextWindowPos({std::max(0.0f, std::min(from.x, screen.x - width)),
                            below + height > screen.y ? from.y - style.ItemSpacing.y - height : below});
+  ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 1);  // of a disabled widget, too
   ImGui::SetTooltip("%s", text);
+  ImGui::PopStyleVar();
   nameWidget(std::string("hint ") + text);
 }
 

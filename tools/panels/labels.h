@@ -83,7 +83,7 @@ class Section {
 /// names of widgets.
 void drawFurther(const FurtherScalars& further, const WantedScalar& wanted, const std::string& prefix,
                  PanelActions& actions);
-/// Shows a line under the widget that the mouse is over, after a moment.
+/// Shows a line under the widget that the mouse is over, after a moment; of one that fills the line behind its label, over the label, too.
 void hint(const char* text);
 
 }  // namespace curvisplat

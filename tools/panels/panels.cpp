@@ -100,7 +100,7 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   return actions;
 }
 
-/// Whether something has been added since the frame before, by a menu, a saved view or undo.
+/// Whether something has been added since the frame before, by a menu or undo.
 bool Panels::hasMoreObjects(const ViewState& state) {
   const size_t now = state.surfaces.size() + state.faces.size() + state.isosurfaces.size() +
                      state.slices.size() + state.clip_planes.size();
@@ -114,11 +114,16 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
     state.volume = draws_volume;
     actions.changed = true;
   }
-  if (!state.hasSheets())
-    hint("It can be hidden once something else is shown: a surface, an isosurface or a slice.");
+  const auto explain = [&] {
+    if (!state.hasSheets())
+      hint("It can be hidden once something else is shown: a surface, an isosurface or a slice.");
+  };
+  explain();
   ImGui::SameLine();
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted("volume");
+  nameWithoutTab("volume");
+  explain();
   ImGui::EndDisabled();
   ImGui::SameLine(0.5f * ImGui::GetContentRegionMax().x);
   commandOption(Command::kPlaneFrames, actions, "frames of cuts", facts.shows_frames);
@@ -409,12 +414,16 @@ void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string
   if (saves && !view_name_.empty()) actions.save_view = std::exchange(view_name_, {});
   for (const std::string& view : views) {
     ImGui::PushID(view.c_str());
-    if (ImGui::Button("x")) actions.remove_view = view;
-    nameWidget("remove view " + view);
-    hint("forget this view");
-    ImGui::SameLine();
-    if (ImGui::Selectable(view.c_str())) actions.load_view = view;
+    const float remove = ImGui::CalcTextSize("Remove").x + 2 * ImGui::GetStyle().FramePadding.x;
+    const float width = ImGui::GetContentRegionAvail().x - remove - ImGui::GetStyle().ItemSpacing.x;
+    ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, {0, 0.5f});
+    if (ImGui::Button(view.c_str(), {width, 0})) actions.load_view = view;
+    ImGui::PopStyleVar();
     nameWidget("view " + view);
+    hint("show it again: camera, colours, objects and all else of the picture");
+    ImGui::SameLine();
+    if (ImGui::Button("Remove")) actions.remove_view = view;
+    nameWidget("remove view " + view);
     ImGui::PopID();
   }
 }

@@ -67,7 +67,7 @@ class Panels {
 
   /// Draws the panels into the current Dear ImGui frame and applies edits to `state`.
   PanelActions draw(ViewState& state, const PanelFacts& facts);
-  /// The film has changed the lists of objects: that brings up no tab.
+  /// The film or a saved view has changed the lists of objects: that brings up no tab.
   void forgetObjects() { objects_seen_.reset(); }
 
  private:

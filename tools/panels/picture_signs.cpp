@@ -50,19 +50,24 @@ void drawLine(std::span<const ImVec2> points, ImU32 colour, bool is_closed, floa
   list->AddPolyline(points.data(), count, colour, flags, width);
 }
 
+/// Names what a grip does with its plane. The one that turns is a ring, so that they can be told apart.
+enum class Grip { kMoves, kTurns };
+
 /// Draws a grip over the picture. Returns whether it is pressed now.
-bool drawGrip(const glm::dvec2& at, const std::string& name, ImU32 colour, const char* help, Window& window) {
+bool drawGrip(Grip kind, const glm::dvec2& at, const std::string& name, ImU32 colour, Window& window) {
   const double size = gripSize();
   ImDrawList* const list = ImGui::GetBackgroundDrawList();
   const auto radius = static_cast<float>(size), ring = ringWidth();
   list->AddCircleFilled(toImGui(at), radius + ring, kDark);
   list->AddCircleFilled(toImGui(at), radius, kLight);
   list->AddCircleFilled(toImGui(at), radius - ring, colour);
+  if (kind == Grip::kTurns) list->AddCircleFilled(toImGui(at), 0.5f * radius, kDark);
   const Rectangle grip{at.x - size, at.y - size, 2 * size, 2 * size};
   window.cover(grip);
   nameArea(name, grip.x, grip.y, grip.width, grip.height);
   if (!grip.contains(mouse()) || ImGui::GetIO().WantCaptureMouse) return false;
-  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) ImGui::SetTooltip("%s", help);
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left))
+    ImGui::SetTooltip("drag to %s the plane", kind == Grip::kTurns ? "turn" : "move");
   return ImGui::IsMouseClicked(ImGuiMouseButton_Left);
 }
 
@@ -175,8 +180,8 @@ bool PlaneHandles::drawTip(ClipPlane& plane, size_t number, const glm::dvec3& mi
   const bool is_dragged = dragged_ && dragged_->number == number && dragged_->turns;
   const ImU32 colour = is_dragged ? kDragged : kColour;
   drawLine(std::array{toImGui(handle), toImGui(handle + along)}, colour, false, 0.15f * ImGui::GetFontSize());
-  const bool pressed = drawGrip(handle + along, fmt::format("tip {}", number + 1), colour,
-                                "drag to turn the plane", scene.window);
+  const bool pressed =
+      drawGrip(Grip::kTurns, handle + along, fmt::format("tip {}", number + 1), colour, scene.window);
   if (pressed && !dragged_) {
     dragged_ = Drag{number, true, mouse(), tip, glm::dot(normal, axes.forward) > 0};
     plane.point = middle;
@@ -196,8 +201,8 @@ bool PlaneHandles::drawTip(ClipPlane& plane, size_t number, const glm::dvec3& mi
 /// Draws the grip in the middle, which moves the plane along its normal.
 bool PlaneHandles::drawHandle(ClipPlane& plane, size_t number, const Normal& normal, const Scene& scene) {
   const bool is_dragged = dragged_ && dragged_->number == number && !dragged_->turns;
-  const bool pressed = drawGrip(normal.handle, fmt::format("handle {}", number + 1),
-                                is_dragged ? kDragged : kColour, "drag to move the plane", scene.window);
+  const bool pressed = drawGrip(Grip::kMoves, normal.handle, fmt::format("handle {}", number + 1),
+                                is_dragged ? kDragged : kColour, scene.window);
   if (pressed && !dragged_) dragged_ = Drag{number};
   if (!dragged_ || dragged_->number != number || dragged_->turns) return false;
   const glm::dvec2 movement = mouse() - normal.handle;

@@ -42,6 +42,7 @@ class Playback {
   /// Goes to the next or the previous step; at an end to the other end if it loops. Returns whether that
   /// changes it.
   bool advance(bool forwards);
+  void stop() { playing_ = false; }
   /// Starts or stops. If it does not loop, it starts from the other end where it could not go on.
   void toggle();
   void setLoop(bool loops) { loops_ = loops; }

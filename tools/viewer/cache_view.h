@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <future>
 #include <glm/vec2.hpp>
 #include <map>
@@ -116,6 +117,7 @@ class CacheView {
  private:
   static std::span<const CommandAction<CacheView>> actions();
   void toggle(bool& value);
+  void goToStep(const std::function<void(Playback&)>& move);
   void addPlaneTo(std::vector<ListedPlane>& planes);
   void saveMovieOf(MovieKind kind);
   void copyLater(MovieKind what) { copy_requested_ = what; }
@@ -136,8 +138,8 @@ class CacheView {
   void colourFaces(const std::string& scalar);
   void findIsosurface(const std::string& scalar, std::optional<uint64_t> replaced = {});
   void takeIsosurfaces();
-  void saveMovieTo(const std::filesystem::path& file, ImageSize size,
-                   std::optional<double> frames_per_s = {});
+  void saveMovieTo(const std::filesystem::path& file, ImageSize size, std::optional<double> frames_per_s = {},
+                   uint64_t turn_frames = 0);
   MovieRequest newMovie(const std::filesystem::path& file, std::optional<double> frames_per_s = {}) const;
   void apply(const FilmActions& actions);
   void addKeyFrame(bool replaces);

@@ -100,10 +100,10 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
          v.changed_ = true;
        },
        kHasSteps, [](const View& v) { return v.playback_.isPlaying(); }},
-      {Command::kNextStep, [](View& v) { v.changed_ |= v.playback_.advance(true); }, kHasSteps},
-      {Command::kPreviousStep, [](View& v) { v.changed_ |= v.playback_.advance(false); }, kHasSteps},
-      {Command::kFirstStep, [](View& v) { v.changed_ |= v.playback_.goTo(0); }, kHasSteps},
-      {Command::kLastStep, [](View& v) { v.changed_ |= v.playback_.goTo(v.playback_.steps() - 1); },
+      {Command::kNextStep, [](View& v) { v.goToStep([](Playback& p) { p.advance(true); }); }, kHasSteps},
+      {Command::kPreviousStep, [](View& v) { v.goToStep([](Playback& p) { p.advance(false); }); }, kHasSteps},
+      {Command::kFirstStep, [](View& v) { v.goToStep([](Playback& p) { p.goTo(0); }); }, kHasSteps},
+      {Command::kLastStep, [](View& v) { v.goToStep([](Playback& p) { p.goTo(p.steps() - 1); }); },
        kHasSteps},
   };
   return kActions;
@@ -126,6 +126,13 @@ bool CacheView::isChecked(Command command) const {
 
 void CacheView::toggle(bool& value) {
   value = !value;
+  changed_ = true;
+}
+
+/// Goes to a step that the user chose. It is to be looked at: playing ends.
+void CacheView::goToStep(const std::function<void(Playback&)>& move) {
+  playback_.stop();
+  move(playback_);
   changed_ = true;
 }
 
@@ -167,6 +174,7 @@ void CacheView::saveMovieOf(MovieKind kind) {
   movie_kind_ = kind;
   const MovieRequest movie = newMovie({});
   FileDialog::MovieOffer offer{movie.size, movie.frames_per_s, {}, encodes_movies_};
+  if (kind == MovieKind::kOneTurn) offer.chosen_frames = framesOf(movie);
   // The dialog may outlive this view.
   offer.frames = [film = film_, frames = framesOf(movie), kind](double rate) {
     return kind == MovieKind::kFilm ? film.frames(rate) : frames;

@@ -264,10 +264,13 @@ void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
   saveMovieTo(file, size);
 }
 
-/// Saves a movie of what is shown now, whatever is changed while it is drawn. `frames_per_s`: nullopt: as usual.
-void CacheView::saveMovieTo(const fs::path& file, ImageSize size, std::optional<double> frames_per_s) {
+/// Saves a movie of what is shown now, whatever is changed while it is drawn. `frames_per_s`: nullopt: as usual; `turn_frames`: 0: as
+/// usual.
+void CacheView::saveMovieTo(const fs::path& file, ImageSize size, std::optional<double> frames_per_s,
+                            uint64_t turn_frames) {
   if (movie_kind_ == MovieKind::kFilm && !film_.film()) return;  // its key frames were removed meanwhile
   MovieRequest movie = newMovie(file, frames_per_s);
+  if (turn_frames > 0) movie.turn_frames = turn_frames;
   const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
   // Text takes the same part of the picture.
   movie.state.annotations.text_size *= static_cast<double>(size.height) / picture_size_.height;
@@ -364,7 +367,7 @@ void CacheView::use(const FileDialog::Chosen& chosen) {
       case FileDialog::Purpose::kOpenSurface:
         return readSurface(file);
       case FileDialog::Purpose::kSaveMovie:
-        return saveMovieTo(file, *chosen.size, chosen.frames_per_s);
+        return saveMovieTo(file, *chosen.size, chosen.frames_per_s, chosen.frames);
       case FileDialog::Purpose::kOpenFilm:
         return openFilm(file);
       case FileDialog::Purpose::kSaveFilm:
@@ -396,6 +399,7 @@ void CacheView::loadView(const std::string& name) {
     loadSurfaces(state);
     state.given = state_.given;
     restore(state);
+    panels_.forgetObjects();  // the next view is chosen where this one was
   } catch (const Error& error) {
     reports_.report(error);
   }

@@ -20,8 +20,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kFramesOfTurn = 90;
-
 /// H.264 needs an even width and height.
 ImageSize sizeFor(const std::filesystem::path& file, ImageSize size) {
   if (file.extension() == ".gif" || isImageName(file)) return size;
@@ -147,7 +145,7 @@ class MovieFrames {
 uint64_t framesOf(const MovieRequest& movie) {
   switch (movie.kind) {
     case MovieKind::kOneTurn:
-      return kFramesOfTurn;
+      return movie.turn_frames;
     case MovieKind::kAllSteps:
       return movie.cache.series().steps.size();
     case MovieKind::kFilm:

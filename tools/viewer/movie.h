@@ -41,6 +41,7 @@ struct MovieRequest {
   ViewState state;
   ImageSize size;  // of the picture in the window; an .mp4 has the next smaller even one
   double frames_per_s = 25;
+  uint64_t turn_frames = 90;  // of kOneTurn, as `render --orbit 360` draws
   Backend backend = Backend::kAutomatic;
   FacesAtStep faces_at = {};               // needed where the state has faces
   bool keep_going = false;                 // past damaged bricks
@@ -51,7 +52,7 @@ struct MovieRequest {
   double magnification = 1;                // of a film's pictures: of another shape than the window's
 };
 
-/// Frames of a movie: 90 once around, as `render --orbit 360` draws; one a time step; of a film those of its times; or one.
+/// Frames of a movie: those of a turn; one a time step; of a film those of its times; or one.
 uint64_t framesOf(const MovieRequest& movie);
 
 /// The name under which a movie named so is written: as it is, or with the frame's number if it is of

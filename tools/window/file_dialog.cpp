@@ -287,11 +287,27 @@ void FileDialog::drawRate() {
   nameWidget("movie rate");
   movie_.frames_per_s = std::clamp(movie_.frames_per_s, 1.0, kMax);
   ImGui::SameLine();
-  const uint64_t frames = movie_.frames(movie_.frames_per_s);
-  const std::string text = fmt::format("pictures a second: {}, {:.1f} s", countText(frames, "picture"),
-                                       static_cast<double>(frames) / movie_.frames_per_s);
-  ImGui::TextUnformatted(text.c_str());
-  nameWidget("movie of " + text);
+  ImGui::TextUnformatted("pictures a second,");
+  ImGui::SameLine();
+  if (movie_.chosen_frames > 0) {
+    constexpr int kMaxFrames = 10'000;
+    int chosen = static_cast<int>(movie_.chosen_frames);
+    ImGui::SetNextItemWidth(5 * ImGui::GetFontSize());
+    ImGui::InputInt("##frames", &chosen, 0, 0);
+    nameWidget("movie pictures");
+    movie_.chosen_frames = static_cast<uint64_t>(std::clamp(chosen, 1, kMaxFrames));
+    ImGui::SameLine();
+  }
+  const uint64_t frames = framesOfMovie();
+  const double seconds = static_cast<double>(frames) / movie_.frames_per_s;
+  const std::string pictures = countText(frames, "picture");
+  ImGui::TextUnformatted(movie_.chosen_frames > 0 ? fmt::format("pictures in all: {:.1f} s", seconds).c_str()
+                                                  : fmt::format("{}: {:.1f} s", pictures, seconds).c_str());
+  nameWidget(fmt::format("movie of pictures a second: {}, {:.1f} s", pictures, seconds));
+}
+
+uint64_t FileDialog::framesOfMovie() const {
+  return movie_.chosen_frames > 0 ? movie_.chosen_frames : movie_.frames(movie_.frames_per_s);
 }
 
 /// A click takes a name, with Control several; a double click opens.
@@ -394,7 +410,10 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
     }
     chosen.files.push_back(path);
     if (*purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie) chosen.size = size_;
-    if (*purpose_ == Purpose::kSaveMovie) chosen.frames_per_s = movie_.frames_per_s;
+    if (*purpose_ == Purpose::kSaveMovie) {
+      chosen.frames_per_s = movie_.frames_per_s;
+      chosen.frames = framesOfMovie();
+    }
     return chosen;
   }
   if (fs::exists(whole(name_), ignored)) {

@@ -49,6 +49,7 @@ class FileDialog {
     std::vector<std::filesystem::path> files;
     std::optional<ImageSize> size = std::nullopt;  // of a picture or a movie
     double frames_per_s = 0;                       // of a movie
+    uint64_t frames = 0;                           // of a movie
   };
   /// Size and rate of a movie, which can be changed.
   struct MovieOffer {
@@ -56,6 +57,7 @@ class FileDialog {
     double frames_per_s = 25;
     std::function<uint64_t(double frames_per_s)> frames = {};  // how many pictures it has at that rate
     bool has_encoder = true;                                   // ffmpeg, which .mp4 and .gif need
+    uint64_t chosen_frames = 0;                                // in place of those; 0: they cannot be chosen
   };
 
   /// `is_grid_folder` may be empty: no folder is. `grid_endings`: of grids' files. `data_folder`: where data were opened last;
@@ -92,6 +94,7 @@ class FileDialog {
   std::optional<Chosen> accept();
   void drawSize();
   void drawRate();
+  uint64_t framesOfMovie() const;
 
   const IsGridFolder is_grid_folder_;
   std::vector<std::string> data_endings_;  // of kOpenData

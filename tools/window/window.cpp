@@ -196,6 +196,7 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
 
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;
+  ImGui::GetIO().MouseDoubleClickTime = 0.5f;  // seconds, as desktops have it
   float scale_x = 1, scale_y = 1;
   glfwGetWindowContentScale(window_, &scale_x, &scale_y);
   content_scale_ = static_cast<double>(scale_x);

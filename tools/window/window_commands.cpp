@@ -277,7 +277,7 @@ void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& 
   std::optional<size_t> removed;
   for (size_t n = shown.size(); n-- > 0;) {
     const Toast& toast = shown[n];
-    const double width = std::min(36 * unit, picture.width - 1.4 * unit);
+    const double width = std::min(44 * unit, picture.width - 1.4 * unit);
     const ImVec2 text =
         ImGui::CalcTextSize(toast.text.c_str(), nullptr, false, static_cast<float>(width - unit));
     const double height = static_cast<double>(text.y) + unit;
@@ -319,7 +319,7 @@ void drawKeys(bool& open, Window& window) {
       {"middle drag, Shift + left drag", "move the picture"},
       {"click", "keep the value there as a marker"},
       {"click an arrow of the axes", "look along it; again: from its other end"},
-      {"drag a round handle", "move a clip plane or a slice; that at the tip turns it"},
+      {"drag a round handle", "move a clip plane or a slice; the ring turns it"},
       {"click into the curve", "add an opacity point; drag it; right click removes it"},
       {"Shift + drag in the curve", "move all points but the first and the last sideways"},
       {"drop files", "open them"},
