@@ -36,8 +36,8 @@ class MeshOrigin final : public SplatOrigin {
   MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
              const MemoryPlan& plan, ScratchFiles scratch);
 
-  /// Makes splats as those of a cache were made: of cells between two faces one or two, by what its block says; of points where
-  /// nodes hang by Manifest::stretch.
+  /// Makes splats as those of a cache were made: of cells between two faces one or two, by what its block says; of points and cells
+  /// where nodes hang by Manifest::stretch.
   void follow(const Manifest& cache);
 
   const GridDescription& description() const override { return reader_.source().description(); }

@@ -35,7 +35,7 @@ uint8_t opposite(uint8_t directions) {
 /// Whether one face may be a half or a quarter of the other. Faces of meshes that meet without fitting are not: each
 /// ends where it is.
 bool isRefined(const glm::dvec3& a, const glm::dvec3& b) {
-  const double halvings = std::abs(std::log2(glm::length(a) / glm::length(b)));
+  const double halvings = std::abs(std::log2(glm::length(a)) - std::log2(glm::length(b)));
   constexpr double kOff = 0.15;  // of each halving
   return std::abs(halvings - 1) < kOff || std::abs(halvings - 2) < 2 * kOff;
 }

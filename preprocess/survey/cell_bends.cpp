@@ -9,6 +9,8 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vector_relational.hpp>
+#include <limits>
 #include <optional>
 #include <queue>
 #include <set>
@@ -150,10 +152,14 @@ bool isAtStairs(unsigned cells) {
 /// How many of a block's inner nodes lie at stairs of blanked ones.
 struct Stairs {
   uint64_t nodes = 0, at_stairs = 0;
+  glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-lower};  // the box of these nodes
 
   void add(const NodeArrays& nodes_around, const std::array<size_t, 3>& strides, size_t at) {
     if (nodes_around.blank[at] != 0) return;
     ++nodes;
+    const glm::dvec3 place(nodes_around.x[at], nodes_around.y[at], nodes_around.z[at]);
+    lower = glm::min(lower, place);
+    upper = glm::max(upper, place);
     unsigned there = 0;
     for (unsigned cell = 0; cell < 8; ++cell) {
       bool whole = true;
@@ -168,7 +174,23 @@ struct Stairs {
     if (isAtStairs(there)) ++at_stairs;
   }
   double share() const { return nodes > 0 ? static_cast<double>(at_stairs) / static_cast<double>(nodes) : 0; }
+  /// Whether the boxes meet. Those of blocks that only touch do not, as these nodes lie within the blocks.
+  bool meets(const Stairs& other) const {
+    return glm::all(glm::lessThanEqual(glm::max(lower, other.lower), glm::min(upper, other.upper)));
+  }
 };
+
+/// Leaves out the stairs of blocks beside others that may be drawn where nodes are blanked: the coarser cells below finer ones, holes
+/// that are cut around bodies.
+void leaveOutCovered(std::vector<Stairs>& of_blocks) {
+  std::vector<Stairs*> covered;
+  for (Stairs& one : of_blocks)
+    if (one.share() > kMaxStairs && std::ranges::any_of(of_blocks, [&](const Stairs& other) {
+          return &other != &one && one.meets(other);
+        }))
+      covered.push_back(&one);
+  for (Stairs* one : covered) one->at_stairs = 0;
+}
 
 /// The stairs of each block. Nodes are blanked by the grid, and where none of the scalars has a value. Scalars of
 /// cells do not count, and of others the first kMaxScalars, whose values are in memory.
@@ -192,6 +214,7 @@ std::vector<Stairs> stairsOf(const GridSource& source, std::vector<uint32_t> sca
              i < std::min(slab.box.endOfRow(block.ni), block.ni - 1); ++i)
           of_blocks[slab.block].add(loaded->nodes, {1, strides.row, strides.plane}, strides.at(i, j, k));
   }
+  leaveOutCovered(of_blocks);
   return of_blocks;
 }
 

@@ -39,7 +39,10 @@ void* openPlugin(const char* name, int flags, std::string& why_not) {
 }
 
 const char* pluginAdvice(std::string_view why_not) {
-  // The dynamic linker's and the system's words for a file that finds no room.
+  // The dynamic linker's and the system's words for a file that finds no room; not those for one that needs a thread's storage from the
+  // start, or that lies where nothing may be executed.
+  for (const char* words : {"static TLS", "not permitted"})
+    if (why_not.find(words) != std::string_view::npos) return "install curvisplat again";
   for (const char* words : {"failed to map", "cannot map", "annot allocate"})
     if (why_not.find(words) != std::string_view::npos) return "raise the limit of memory (ulimit -v)";
   return "install curvisplat again";

@@ -431,7 +431,7 @@ size_t CacheReader::variableNamed(std::string_view name) const {
       "{}: the cache has no scalar '{}'{}; it has {}{}", path().string(), name, meant, listed(names),
       can_grow ? fmt::format("; curvisplat convert GRID ... --add-scalar {} --to {} adds one that "
                              "the grid's files have or that can be computed",
-                             name, path().filename().string())
+                             name, path().string())
                : "");
 }
 

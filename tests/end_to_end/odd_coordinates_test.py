@@ -47,7 +47,7 @@ class OddCoordinates(StructuredFormats):
         self.assertEqual(info["blanked"]["not_finite"], odd)
         for n, axis in enumerate(self.block.places):
             np.testing.assert_allclose([info["bounds"][end][n] for end in ("lower", "upper")], [axis[seen].min(), axis[seen].max()], rtol=1e-6)
-        manifest = self.manifest(self.convert(paths, scalar))
+        manifest = self.manifest(self.convert(paths, scalar, "--refine", "1"))
         self.assertEqual(manifest["splats"], SHAPE[0] * SHAPE[1] * SHAPE[2] - odd)
         if double:
             self.block.places[2, 3, 3, 3] = -1e300

@@ -479,7 +479,8 @@ TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
       {{"--opacity-by", "x"},
        2,
        "--opacity-by: " + cache +
-           ": the cache has no scalar 'x'; it has s0, s1; curvisplat convert GRID ... --add-scalar x --to "},
+           ": the cache has no scalar 'x'; it has s0, s1; curvisplat convert GRID ... --add-scalar x --to " +
+           cache + " adds one that the grid's files have or that can be computed"},
       {{"--opacity-range", "0,1"}, 2, "--opacity-range 0,1: needs --opacity-by NAME"},
       {{"--opacity-by", "s0", "--opacity-range", "1,1"},
        2,

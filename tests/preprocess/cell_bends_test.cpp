@@ -225,6 +225,23 @@ TEST(RefinementByNeed, HalvesCellsOfSmallBlocksThatEndInStairs) {
   EXPECT_EQ(refinementByNeed(sea(Land::kStairs, 16, true, -99), {0}, -99).ofBlock(0), halves);
 }
 
+/// What a block blanks may be drawn by another, as coarser cells are below finer ones.
+TEST(RefinementByNeed, LeavesStairsThatAnotherBlockMayFill) {
+  const auto two_blocks = [](double second_from) {
+    GridBlock block = gridBlock(16, 16, 16);
+    block.has_blanking = true;
+    return FunctionGridSource({block, gridBlock(9, 9, 9)}, 1, [=](const GridNode& node) {
+      const glm::dvec3 at(static_cast<double>(node.i), static_cast<double>(node.j),
+                          static_cast<double>(node.k));
+      if (node.block == 1) return NodeValues{second_from + 0.5 * at, {1.0f}, false};
+      return NodeValues{at, {1.0f}, 3 * node.k < node.i + node.j};
+    });
+  };
+  EXPECT_EQ(refinementByNeed(two_blocks(0), {0}).ofBlock(0), kWholeCells);
+  EXPECT_EQ(refinementByNeed(two_blocks(15), {0}).ofBlock(0),
+            (CellCuts{2, 2, 2}));  // touches the first one's corner
+}
+
 /// A scalar of one value everywhere, and one that is 0 here and there.
 std::unique_ptr<FunctionGridSource> withScatteredZeros() {
   return std::make_unique<FunctionGridSource>(
