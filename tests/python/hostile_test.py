@@ -205,7 +205,7 @@ class HostileTest(unittest.TestCase):
                 seen.add((k0, j0))
                 return x * 1e300 if again else x, y, z, values, blank
             expect(curvisplat.Error, "something changes it while it is converted", lambda: call(far_away, refine=1))
-            rounds = iter(range(1000))
+            rounds = iter(range(1_000_000))
             def different(block, k0, k1, j0, j1, names):
                 random = np.random.default_rng(next(rounds))
                 part = lambda: random.random((k1 - k0, j1 - j0, 32)) * 10.0 ** random.integers(-3, 4)
