@@ -56,6 +56,7 @@ class Messages(FormatCase):
                  "a.stl": ("solid of exported".ljust(80, "\0") + "\2\0\0\0" + 100 * "\1", "a surface without a volume"),
                  "a.msh": ("(0 machine configuration:)\n(4 (60 0 0 1 2 4 4 4 8 4 8 4))\n(3010 (1 1 8 1 3)(\0\0\0\1" + 200 * "\0", "a Fluent mesh"),
                  "b.msh": ("$NOD\n4\n" + "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n" + "$ENDNOD\n$ELM\n1\n1 4 1 1 4 1 2 3 4\n$ENDELM\n", "a Gmsh mesh of version 1"),
+                 "a.tec": ("\ufeffVARIABLES = x y z\nZONE I=2 J=2 K=2\n", "begins with a byte order mark"),
                  "CHGCAR": ("Si\n 1.0\n", "of VASP"), "d3plot": ("\1" * 300, "of LS-DYNA")}
         for name, (text, words) in files.items():
             with self.subTest(name):

@@ -68,6 +68,8 @@ constexpr Magic kMagics[] = {
     {"\0\0\0\x10"
      "DIMENS  "sv,
      "an ECLIPSE grid (GRID), which is not read"},
+    {"\xef\xbb\xbf"sv,
+     "text that begins with a byte order mark, which is not read (sed -i '1s/^\\xEF\\xBB\\xBF//' FILE)"},
     {"\xff\xfe"sv, kUtf16},
     {"\xfe\xff"sv, kUtf16},
     {"version https://git-lfs"sv, "a pointer of Git LFS in the place of the file itself (git lfs pull)"},
