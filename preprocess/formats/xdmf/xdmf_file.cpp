@@ -175,8 +175,9 @@ class Reader {
     });
   }
 
-  /// Makes one grid of those of one mesh: dolfinx writes a collection of steps for each function, and a run that was restarted
-  /// writes a time again. Of attributes of one name in several grids the last is read.
+  /// Makes one grid of those of one mesh: dolfinx writes a collection of steps for each function, and a run
+  /// that was restarted writes a time again. Where several grids have an attribute of one name, the last is
+  /// read.
   void joinGridsOfOneMesh() {
     std::map<std::string, size_t> texts;
     std::map<pugi::xml_node, size_t> numbers;
