@@ -308,6 +308,15 @@ class EnsightCases(MeshFormats):
             self.assertEqual([s["name"] for s in self.info(self.path)["scalars"]], [shown])
             self.convert([self.path], shown)
 
+    def test_several_steps_at_one_time(self):
+        mesh = self.rounded(Mesh(2, (8,)))
+        self.write(mesh)
+        self.path.write_text(self.path.read_text().replace("0.5\n 1.5", "0.5\n 0.5"))
+        info = self.info(self.path)
+        self.assertEqual(info["times"], [0.5])
+        self.assertIn("time set 1 has several steps at time 0.5; the last one is read", info["warnings"])
+        self.assertAlmostEqual(next(s for s in info["scalars"] if s["name"] == "p")["max"], 2 * mesh.p.max(), places=4)
+
     def test_several_parts(self):
         """Two parts of the cube are the cube: nodes that they share coincide."""
         mesh = self.rounded(Mesh(kinds=(8,)))

@@ -248,6 +248,37 @@ class MeshFoam(MeshCase):
             self.assertIn(f"{name} is left out", "".join(info["warnings"]))
         self.assertIn("foamDictionary -expand", "".join(info["warnings"]))
 
+    def test_entries_that_replace_others_and_conditions(self):
+        """The last entry of a name counts, also across files. What follows #if, #ifeq and #else is read where it holds."""
+        case, _, _ = self.foam_case()
+        (case / "0" / "values").write_text("inner $outer;\ntwice 2;\n")
+        head = "dimensions [0 2 -2 0 0 0 0];\n"
+        writer = FoamCase(case)
+        fields = {"a": ('twice 1;\n#include "values"\n', "$twice", 2), "b": ('#include "values"\ntwice 3;\n', "$twice", 3),
+                  "c": ('outer 5;\n#include "values"\nouter 6;\n', "$inner", 5),
+                  "d": ("k x;\nv 1;\n#ifeq $k x\nv 2;\n#else\nv 3;\n#endif\n", "$v", 2),
+                  "e": ("k x;\n#ifeq $k y\n#if 1\nv 1;\n#else\nv 4;\n#endif\nv 2;\n#else\nv 3;\n#endif\n", "$v", 3),
+                  "f": ("v 1;\n#if off\nv 2;\n#endif\n", "$v", 1), "g": ("v 1;\n#if true\nv 2;\n#endif\n", "$v", 2)}
+        for name, (entries, value, _) in fields.items():
+            writer.write(case / "0" / name, "volScalarField", entries, head, f"internalField uniform {value};\n")
+        writer.write(case / "0" / "h", "volScalarField", "v 1;\n#if $unknown\nv 2;\n#endif\n", head, "internalField uniform $v;\n")
+        info = self.info(case)
+        scalars = {scalar["name"]: scalar["max"] for scalar in info["scalars"]}
+        self.assertEqual({name: scalars.get(name) for name in fields}, {name: value for name, (_, _, value) in fields.items()})
+        self.assertIn('has "$unknown" in the place of a word of #if', "".join(info["warnings"]))
+        self.assertNotIn("h", scalars)
+
+    def test_spherical_tensors_and_fields_without_boundaries_of_old_versions(self):
+        case, p, _ = self.foam_case()
+        writer = FoamCase(case)
+        head = "dimensions [0 2 -2 0 0 0 0];\n"
+        rows = "\n".join(f"({value!r})" for value in p.tolist())
+        writer.write(case / "0" / "a", "volSphericalTensorField", head, f"internalField nonuniform List<sphericalTensor> 64\n(\n{rows}\n);\n")
+        writer.write(case / "0" / "b", "volSphericalTensorField", head, "internalField uniform (4);\n")
+        writer.write(case / "0" / "c", "volScalarField::DimensionedInternalField", head, "value nonuniform List<scalar> 64{0.5};\n")
+        scalars = {scalar["name"]: scalar["max"] for scalar in self.info(case)["scalars"]}
+        self.assertEqual([round(scalars.get(name, 0), 5) for name in "abc"], [round(p.max(), 5), 4, 0.5])
+
     def test_a_field_of_another_mesh_is_left_out(self):
         for binary in (False, True):
             with self.subTest(binary=binary):

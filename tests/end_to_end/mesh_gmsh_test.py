@@ -64,6 +64,13 @@ class MeshGmsh(MeshCase):
             info = {scalar["name"]: scalar for scalar in self.info(path)["scalars"]}
             self.assertEqual((info["c"]["min"], info["c"]["max"]), (np.float32(values[solid].min()), np.float32(values[solid].max())))
 
+    def test_comments_before_the_format(self):
+        grid = cube(kinds=("hexahedron",))
+        for order in ("<", ""):
+            path = self.written(grid, 4.1, order)
+            path.write_bytes(b"$Comments\nmade by hand\n$EndComments\n" + path.read_bytes())
+            self.assertEqual(self.info(path)["cells"]["count"], grid.GetNumberOfCells())
+
     def test_cells_of_second_order(self):
         grid = cube(kinds=("quadratic",))
         for version, order in some_of(self.VARIANTS, 3):

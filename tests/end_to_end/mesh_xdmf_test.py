@@ -155,6 +155,29 @@ class XdmfMeshes(MeshFormats):
                               ("xpointer(count(//*))", "is not read"), ("xpointer(//Grid[@Name='mesh']/Topology[", "includes xpointer")):
             self.expect_line(self.included(mesh, 'Version="3.0"', "xi", pointer), words=told)
 
+    def test_functions_and_steps_of_one_mesh(self):
+        """dolfinx writes each function as a collection of its own, whose steps include one mesh; other programs repeat it, or a step."""
+        mesh = Mesh(2)
+        whole = self.grid(mesh, self.mixed(mesh))
+        head, attributes = whole[6:].split("<Attribute", 1)[0], {n: "<Attribute" + a for n, a in zip("pc", whole[:-7].split("<Attribute")[1:])}
+        include = """<xi:include xpointer="xpointer(/Xdmf/Domain/Grid[@Name='mesh']/*[self::Topology or self::Geometry])"/>"""
+
+        def steps(name, parts):
+            return (f'<Grid Name="{name}" GridType="Collection" CollectionType="Temporal">'
+                    + "".join(f'<Grid><Time Value="{n}"/>{parts}{attributes[name]}</Grid>' for n in (0, 0.5)) + "</Grid>")
+
+        for text in (f'<Grid Name="mesh">{head}</Grid>{steps("p", include)}{steps("c", include)}', steps("p", head) + steps("c", head)):
+            info = self.info(self.write(text))
+            self.assertEqual((info["times"], info["cells"]["count"], info["warnings"]), ([0, 0.5], len(mesh.cells), []))
+            self.expect_same([self.path], mesh.vtk())
+        # The second time was written by a run that ended, and again by the one that went on from the step before.
+        again = self.item(mesh.p + 1)
+        text = steps("p", head)[:-7] + f'<Grid><Time Value="0.5"/>{head}<Attribute Name="p" Center="Node">{again}</Attribute></Grid></Grid>'
+        info = self.info(self.write(text), "--time-step", 1)
+        self.assertEqual((info["cells"]["count"], info["times"]), (len(mesh.cells), [0, 0.5]))
+        self.assertEqual(info["warnings"], ["several grids of one mesh have the attribute p at time 0.5; the last one is read"])
+        self.assertAlmostEqual(info["scalars"][0]["max"], mesh.p.max() + 1, places=5)
+
     @unittest.skipUnless(meshio, "no meshio")
     def test_series_by_meshio(self):
         mesh = Mesh(2, (8,))

@@ -55,12 +55,16 @@ class Messages(FormatCase):
                  "a.obj": ("# Blender\nmtllib a.mtl\no Cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\ns off\nf 1 2 3\n", "a surface without a volume"),
                  "a.stl": ("solid of exported".ljust(80, "\0") + "\2\0\0\0" + 100 * "\1", "a surface without a volume"),
                  "a.msh": ("(0 machine configuration:)\n(4 (60 0 0 1 2 4 4 4 8 4 8 4))\n(3010 (1 1 8 1 3)(\0\0\0\1" + 200 * "\0", "a Fluent mesh"),
+                 "b.msh": ("$NOD\n4\n" + "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n" + "$ENDNOD\n$ELM\n1\n1 4 1 1 4 1 2 3 4\n$ENDELM\n", "a Gmsh mesh of version 1"),
+                 "a.tec": ("\ufeffVARIABLES = x y z\nZONE I=2 J=2 K=2\n", "begins with a byte order mark"),
                  "CHGCAR": ("Si\n 1.0\n", "of VASP"), "d3plot": ("\1" * 300, "of LS-DYNA")}
         for name, (text, words) in files.items():
             with self.subTest(name):
                 result = self.run_program("info", self.write(name, text))
                 self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
                 self.assertIn(words, result.stderr)
+        table = self.write("table.txt", "points of a probe\nn x y z\n" + "".join(f"{n} {n} 0 0.5\n" for n in range(9)))
+        self.assertNotIn("cube file", self.run_program("info", table).stderr)
         case = self.write("case/system/controlDict", "FoamFile\n{\n}\n").parent.parent
         for path, command in ((case, "info"), (self.write("case/case.foam", ""), "info"), (case, "render"), (case, "convert")):
             result = self.run_program(command, path, *([] if command == "info" else ["-o", self.folder / ("a.png" if command == "render" else "a.splats")]))

@@ -8,7 +8,7 @@ import json
 import subprocess
 import unittest
 
-from model_files import PROGRAM, File, ModelFileTest, np
+from model_files import PROGRAM, File, ModelFileTest, netCDF4, np
 
 X, Y = np.array([0, 1000, 2000, 0, 1000, 2000, 3000.0]), np.array([0, 0, 0, 1000, 1000, 1000, 500.0])
 FACES = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [2, 6, 5, -1]])  # 2.5 km2
@@ -98,6 +98,30 @@ class Columns(ModelFileTest):
         with File(self.folder / "temperature_1.nc", SIZES) as f:
             self.field(f, "face", "layer")
         self.expect("zCoordinates", "out2d_1.nc", "temperature_1.nc", "zCoordinates_1.nc")
+
+    def test_places_without_units(self):
+        """The standard_name says that they are lengths; numbers that are no degrees are refused."""
+        def write(**attributes):
+            with self.mesh() as f:
+                for name in "xy":
+                    f[name].delncattr("units")
+                    f[name].setncatts(attributes)
+                f.add("layer", "layer", MIDDLES, units="m", positive="up")
+
+        write()
+        info = self.info()
+        self.assertIn("x and y have no unit of length; metres are assumed", info["warnings"])
+        np.testing.assert_allclose(info["bounds"]["upper"][:2], [3, 1])
+        write(standard_name="place")
+        self.assertIn("x is 0 .. 3000 and y is 0 .. 1000 degrees, which are no longitudes and latitudes", self.info(fails=True))
+
+    def test_nodes_at_no_place_on_the_earth(self):
+        """A fill value that no attribute names."""
+        self.globe(1)
+        with netCDF4.Dataset(self.folder / "file.nc", "a") as f:
+            f["y"][3] = -999
+        info = self.info()
+        self.assertEqual(info["blanked"]["not_finite"], 5)
 
     def test_fesom_without_attributes(self):
         """Its mesh files were once without those of UGRID, and without units; outputs have points or layers first."""

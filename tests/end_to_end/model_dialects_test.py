@@ -4,6 +4,7 @@
 NetCDF files as particular models and archives write them: CESM's POP, COSMO, MERRA-2, ERA5. model_files.py says how. Exit status 77
 (skipped) without python3-netcdf4.
 """
+import json
 import subprocess
 import unittest
 
@@ -289,6 +290,18 @@ class Levels(ModelFileTest):
             self.levels("lev", [20.0, 100, 500, 1000], more, units="level", positive="down")
             self.expect_heights(standard_altitude(1e5 * a[:, None, None] + b[:, None, None] * ground))
 
+    def test_the_logarithm_of_the_surface_pressure(self):
+        """The ECMWF's levels: lnsp, as a field of one level."""
+        a, b, ground = np.array([2000.0, 9000, 8000, 0]), np.array([0, 0.1, 0.6, 1]), 95000 + 6000 * RANDOM.random((8, 12))
+        for attributes in ({"standard_name": "atmosphere_hybrid_sigma_pressure_coordinate", "formula_terms": "ap: hyam b: hybm ps: lnsp"}, {}):
+            def more(f):
+                f.createDimension("lev_2", 1)
+                f.add("hyam", "lev", a, units="Pa")
+                f.add("hybm", "lev", b)
+                f.add("lnsp", "lev_2 lat lon", np.log(ground)[None], long_name="Logarithm of surface pressure")
+            self.levels("lev", [1.0, 2, 3, 4], more, units="level", positive="down", **attributes)
+            self.expect_heights(standard_altitude(a[:, None, None] + b[:, None, None] * ground))
+
     def test_hybrid_terms_between_the_levels(self):
         """GFDL: pk and bk are those of half levels; FV3's ak and bk are attributes of the file."""
         a, b, ground = np.array([5e3, 2e4, 1.5e4, 1e3, 0]), np.array([0, 0.1, 0.5, 0.8, 1]), 70000 + 30000 * RANDOM.random((8, 12))
@@ -429,6 +442,26 @@ class Places(ModelFileTest):
                 f.add("t", "lev y x", t, "f4", coordinates="x y" if dims == 1 else "cx cy")
             self.expect(self.info(), sphere(lon, lat, np.array([0, 1, 3])[:, None, None]), t)
 
+    def test_degrees_west_and_south(self):
+        """UDUNITS has these as -1 degree_east and -1 degree_north."""
+        t = RANDOM.random((3, 8, 12)).astype("f4")
+        west, south = 10.0 + np.arange(12), 40.0 + np.arange(8)
+        with self.file(lon=12, lat=8, lev=3) as f:
+            f.add("lon", "lon", west, units="degrees_west")
+            f.add("lat", "lat", south, units="degrees_south")
+            f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+            f.add("t", "lev lat lon", t, "f4")
+        self.expect(self.info(), sphere(*np.meshgrid(-west, -south), np.array([0, 1, 3])[:, None, None]), t)
+
+    def test_places_in_a_unit_of_no_length(self):
+        for unit in ("rad", "pixel"):
+            with self.file(x=12, y=8, z=3) as f:
+                for name, count in (("x", 12), ("y", 8)):
+                    f.add(name, name, 0.5 * np.arange(count), units=unit, standard_name=f"projection_{name}_coordinate")
+                f.add("z", "z", [0, 1000, 3000], units="m", positive="up")
+                f.add("t", "z y x", RANDOM.random((3, 8, 12)), "f4")
+            self.assertIn(f"x and y have the unit '{unit}', which is no length; metres are assumed", self.info()["warnings"])
+
     def test_idealised_runs(self):
         """WRF: XLAT and XLONG are 0, or metres with the unit of degrees; DX and DY are the distances of the nodes."""
         x, y = np.meshgrid(2000.0 * np.arange(12), 3000.0 * np.arange(8))
@@ -564,6 +597,25 @@ class Fields(ModelFileTest):
             f.add("T", "Time bottom_top south_north west_east", RANDOM.random((1, 4, 8, 12)), "f4", units="K")
         info = self.info()
         self.assertEqual([s["name"] for s in info["scalars"]], ["T"])
+
+    def test_slices_of_a_series_have_their_times(self):
+        """As iris, xarray and cfgrib save one time: as a scalar; of a forecast also when it began."""
+        for forecast in (False, True):
+            paths = []
+            for n, day in enumerate((3, 8, 20)):
+                with self.file(f"s_{n}.nc", lon=12, lat=8, lev=3) as f:
+                    self.air(f)
+                    f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+                    f.add("time", "", 0 if forecast else day, units="days since 2000-01-01", standard_name="time")
+                    if forecast:
+                        f.add("valid_time", "", day, units="days since 2000-01-01", standard_name="time")
+                    f.add("T", "lev lat lon", RANDOM.random((3, 8, 12)), "f4", coordinates="time valid_time" if forecast else "time")
+                paths.append(self.folder / f"s_{n}.nc")
+            self.assertEqual(self.info("s_1.nc")["times"], [8])
+            cache = self.folder / "s.splats"
+            subprocess.run([PROGRAM, "convert", *paths, "-o", cache, "--overwrite"], check=True, capture_output=True)
+            told = json.loads(subprocess.run([PROGRAM, "info", "--json", cache], check=True, capture_output=True).stdout)
+            self.assertEqual([step["time"] for step in told["steps"]], [3, 8, 20])
 
     def test_months_and_members_are_steps(self):
         t = RANDOM.random((5, 3, 8, 12)).astype("f4")

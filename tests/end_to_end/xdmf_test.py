@@ -312,6 +312,8 @@ class Xdmf(StructuredFormats):
                               ('<Grid><Topology Reference="//*[//*]"/></Grid>', "refers to"),
                               ('<Grid><xi:include href="b.xmf"/></Grid>', "another file (XInclude)"), ("", "has no Grid"), (text[:-9], "not valid XML")):
             self.expect_line(self.write(damaged), words=told)
+        info = self.info(self.write(text.replace("/group/1", "/group/1|0:1:9:9")))
+        self.assertIn('selects a part of its data, "|0:1:9:9"', "".join(info["warnings"]))
         bad = self.new("Binary")
         path = self.write(grid(bad, block))
         (self.folder / "a.bin").write_bytes(bad.binary[:-1])

@@ -276,6 +276,23 @@ TEST(VtkEncodings, ArraysThatAreNotDrawnDoNotStopTheOthers) {
                                 "left out: array words of the points has type String, which is not drawn"}));
 }
 
+TEST(VtkEncodings, IntegersOfTextsAreExact) {
+  const TestFolder folder("vts-integers");
+  VtsEncoding ascii;
+  ascii.format = VtsEncoding::Format::kAscii;
+  VtsGrid grid = annulusVtsGrid(3, 3, 3);
+  grid.point_data = {{"a", "UInt64", 1, std::vector<double>(27, 5)},
+                     {"b", "Int64", 1, std::vector<double>(27, 5)}};
+  grid.point_data[0].values[9] = grid.point_data[1].values[9] = 987654;
+  std::string text = vtsFile(grid, ascii);
+  for (const std::string_view most : {"18446744073709551615", "9223372036854775807"})
+    text.replace(text.find("987654"), 6, most);
+  const auto source = openText(folder, text);
+  const NodeArrays nodes = allNodes(*source, 0);
+  EXPECT_EQ(nodes.scalars[0][9], 0x1p64f);
+  EXPECT_EQ(nodes.scalars[1][9], 0x1p63f);
+}
+
 TEST(VtkEncodings, TextsMustHaveAsManyNumbersAsTheGrid) {
   const TestFolder folder("vts-texts");
   VtsEncoding ascii;

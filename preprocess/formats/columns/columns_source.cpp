@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <iterator>
@@ -64,9 +65,14 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
   const auto length = kilometresOf(unit);
   const bool radians =
       unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID" && map_.format != "FESOM");
-  const bool plane = length.has_value() || map_.longitude->name == "xVertex";
+  const bool plane =
+      length.has_value() || map_.longitude->name == "xVertex" || cfRole(file_, *map_.longitude) == CfRole::kX;
+  if (plane && !length && map_.format == "UGRID")
+    description_.warnings.push_back(fmt::format("{} and {} have no unit of length; metres are assumed",
+                                                map_.longitude->name, map_.latitude->name));
   to_degrees_ = plane ? length.value_or(1e-3) : radians ? 180 / std::numbers::pi : 1;
   globe_ = globeWith(options.globe, !plane, 0.0);
+  requireDegrees();
   if (heights_.levels.empty()) spoolHeights(options.temporary_folder);
   describe(options);
   findCutFaces();
@@ -86,6 +92,11 @@ void ColumnsSource::findTimes(const OpenGridOptions& options) {
     }
     if (dimension.length == 0)
       throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(), dimension.name);
+  } else {
+    const CfTimes time = cfTimeOfSlice(file_);
+    description_.times = time.values;
+    description_.time_unit = time.unit;
+    description_.calendar = time.calendar;
   }
   description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
 }
@@ -202,6 +213,32 @@ void ColumnsSource::readHeights(uint64_t level, uint64_t first, std::span<double
     node_heights_.read(level * map_.nodes + first, out);
   else
     std::fill(out.begin(), out.end(), heights_.levels[level]);
+}
+
+/// Throws where most of the nodes lie at no place on the Earth.
+void ColumnsSource::requireDegrees() const {
+  if (!globe_.degrees()) return;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::array<double, 2> least{kInfinity, kInfinity}, most{-kInfinity, -kInfinity};
+  uint64_t wrong = 0;
+  for (uint64_t first = 0; first < map_.nodes; first += kFacesAtOnce) {
+    const uint64_t count = std::min(kFacesAtOnce, map_.nodes - first);
+    const std::array angles{readAngles(*map_.longitude, first, count),
+                            readAngles(*map_.latitude, first, count)};
+    for (uint64_t n = 0; n < count; ++n) wrong += !isOnEarth(angles[0][n], angles[1][n]);
+    for (size_t axis = 0; axis < 2; ++axis)
+      for (const double angle : angles[axis]) {
+        least[axis] = std::min(least[axis], angle);
+        most[axis] = std::max(most[axis], angle);
+      }
+  }
+  if (2 * wrong > map_.nodes)
+    throw Error(
+        "{}: {} is {:g} .. {:g} and {} is {:g} .. {:g} degrees, which are no longitudes and latitudes: "
+        "lengths "
+        "need a unit of length (ncatted -a units,{},o,c,m FILE)",
+        file_.path().string(), map_.longitude->name, least[0], most[0], map_.latitude->name, least[1],
+        most[1], map_.longitude->name);
 }
 
 /// Calls use(face, its nodes) for each; nodes below 0 are none.
@@ -326,8 +363,10 @@ void ColumnsSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::sp
     for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n) {
       const uint64_t column = n / part.layers, layer = n % part.layers;
       out.hidden.push_back(values_at_nodes && static_cast<double>(part.layer + layer) >= layers[column]);
-      const glm::dvec3 place = globe_.place(globe_.column(longitude[column], latitude[column]),
-                                            heights[layer * part.columns + column]);
+      const bool nowhere = globe_.degrees() && !isOnEarth(longitude[column], latitude[column]);
+      const glm::dvec3 place = nowhere ? glm::dvec3(std::numeric_limits<double>::quiet_NaN())
+                                       : globe_.place(globe_.column(longitude[column], latitude[column]),
+                                                      heights[layer * part.columns + column]);
       out.x.push_back(place.x);
       out.y.push_back(place.y);
       out.z.push_back(place.z);

@@ -48,6 +48,7 @@ class ColumnsSource final : public MeshSource {
   void forEachFace(const Use& use) const;
   /// Finds the faces that a flat map is cut through.
   void findCutFaces();
+  void requireDegrees() const;
   /// Notes how far flat prisms lie below the sphere, where layers are thinner than that.
   void noteSagitta();
   /// The mean thickness of the thinnest layer over the first nodes, in kilometres; 0 if there is none.

@@ -241,6 +241,9 @@ EnsightCase CaseReader::run(std::optional<uint32_t> step) {
           "{}: time set {} has {} times for {} steps, or times that are not finite or do not rise; the "
           "file is damaged",
           path_.string(), number, set.times.size(), numberText(set.steps));
+    if (const auto equal = std::ranges::adjacent_find(set.times); equal != set.times.end())
+      result.warnings.push_back(
+          fmt::format("time set {} has several steps at time {:g}; the last one is read", number, *equal));
     result.times.insert(result.times.end(), set.times.begin(), set.times.end());
   }
   std::sort(result.times.begin(), result.times.end());

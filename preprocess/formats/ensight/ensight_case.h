@@ -44,7 +44,7 @@ struct EnsightCase {
   std::vector<EnsightVariable> variables;
   std::vector<double> times;
   uint32_t time_step = 0;
-  std::vector<std::string> warnings;  // of what is left out
+  std::vector<std::string> warnings;
 };
 
 /// Names are relative to `folder`. Throws Error if the case is damaged, of another version than Gold, or names a file that

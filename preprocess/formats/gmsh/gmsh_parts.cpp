@@ -12,7 +12,7 @@
 namespace curvisplat {
 
 double readGmshFormat(GmshReader& reader) {
-  reader.requiredLine();
+  while (reader.requiredLine() == "$Comments") reader.skipTo("$EndComments");
   const double version = reader.textNumber(), binary = reader.textNumber(), bytes = reader.textNumber();
   if (version != 4.1 && version != 4 && version != 2 && version != 2.1 && version != 2.2)
     throw Error(

@@ -383,8 +383,8 @@ void GmshSource::readValues(uint32_t, uint32_t scalar, uint64_t first, std::span
 }  // namespace
 
 bool isGmsh(const InputFile& file) {
-  constexpr std::string_view kSignature = "$MeshFormat";
-  return beginningOf(file, kSignature.size()) == kSignature;
+  const std::string begin = beginningOf(file, std::string_view("$MeshFormat").size());
+  return begin == "$MeshFormat" || begin.starts_with("$Comments");
 }
 
 uint64_t gmshFiles(const std::filesystem::path& path) {

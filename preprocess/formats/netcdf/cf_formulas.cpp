@@ -8,6 +8,7 @@
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
 #include "preprocess/formats/netcdf/cf_vertical.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -30,7 +31,7 @@ struct TermNames {
   std::initializer_list<const char*> names;
 };
 const TermNames kTermNames[] = {
-    {"ps", "surface_air_pressure", {"PS", "ps", "aps", "PSFC", "sp", "pressfc"}},
+    {"ps", "surface_air_pressure", {"PS", "ps", "aps", "PSFC", "sp", "pressfc", "lnsp"}},
     {"orog", "surface_altitude", {"orog", "surface_altitude", "HSURF", "topo"}},
     {"depth", "sea_floor_depth_below_geoid", {"h", "bathymetry", "deptho"}},
     {"eta", "sea_surface_height_above_geoid", {"zeta", "ssh", "zos"}},
@@ -63,6 +64,14 @@ std::optional<CfTerm> termNamed(const NetcdfFiles& file, const std::map<std::str
   if (!variable) variable = standIn(file, key, block);
   if (!variable || !variable->numeric) return std::nullopt;
   return CfTerm::of(file, *variable, block);
+}
+
+/// The ECMWF's lnsp is the logarithm of the surface's pressure in pascals.
+bool isLogarithm(const NetcdfVariable& variable) {
+  const std::string name = lowerCase(variable.name);
+  return name == "lnsp" || name == "lnps" ||
+         lowerCase(variable.text("long_name") + variable.text("standard_name")).find("logarithm") !=
+             std::string::npos;
 }
 
 /// The value of a scalar term.
@@ -279,6 +288,7 @@ bool CfVertical::setAirTerms(const NetcdfFiles& file, const Terms& terms, const 
   }
   if (!depth_) warnings_.push_back("no surface pressure (ps); 1013.25 hPa is assumed");
   depth_c_ = depth_ ? pascalsOf(depth_->variable().text("units")).value_or(1) : 1;
+  log_surface_ = depth_ && isLogarithm(depth_->variable());
   a_ = pressure(termNamed(file, terms, kind_ == Kind::kSigmaPressure ? "ptop" : "p0", block),
                 kind_ == Kind::kSigmaPressure ? 0 : 1e5);
   // ap is a pressure already, and so is what GEOS-Chem calls a, and numbers beyond 10; else a is a part of p0.

@@ -128,11 +128,12 @@ void CfNodes::readMiddles(const CfRange& range, std::vector<glm::dvec3>& columns
   std::vector<double> longitudes(box.values()), latitudes(box.values());
   files_.read(grid_.longitude.variable(), box, longitudes);
   files_.read(grid_.latitude.variable(), grid_.latitude.boxOf(range), latitudes);
-  const double to_radians = glm::radians(degreesOf(grid_.longitude.variable().text("units")));
+  const double of_longitude = glm::radians(degreesOf(grid_.longitude.variable().text("units"))),
+               of_latitude = glm::radians(degreesOf(grid_.latitude.variable().text("units")));
   const uint64_t row = lengthOf(range, 0) + 1;
   std::vector<glm::dvec3> corners;
   for (size_t n = 0; n < longitudes.size(); ++n) {
-    const double east = to_radians * longitudes[n], north = to_radians * latitudes[n];
+    const double east = of_longitude * longitudes[n], north = of_latitude * latitudes[n];
     corners.push_back({std::cos(north) * std::cos(east), std::cos(north) * std::sin(east), std::sin(north)});
   }
   columns.clear();

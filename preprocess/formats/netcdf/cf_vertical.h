@@ -151,6 +151,7 @@ class CfVertical {
   double z1_ = 0, z2_ = 0;                     // kDoubleSigma
   double levels_of_sigma_ = 0;                 // kSigmaZ: infinite if not known; kDoubleSigma: k_c
   double depth_c_ = 0, a_ = 0, b_ = 0;         // of the air: a_ the reference or top pressure
+  bool log_surface_ = false;                   // depth_ is the logarithm of the surface's pressure
   size_t axis_ = 2;                            // kThickness: of the layers
   uint64_t layers_ = 0;                        // kThickness: their number
   bool from_bottom_ = false;                   // kThickness: the first layer is the lowest

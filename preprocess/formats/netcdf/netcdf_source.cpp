@@ -254,10 +254,12 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
                     file_.dimensions()[grid_.dims.axes[grid_.levels]].name));
   for (const auto* warnings : {&grid_.vertical.warnings(), &file_.warnings()})
     description_.warnings.insert(description_.warnings.end(), warnings->begin(), warnings->end());
-  if (!grid_.degrees && !grid_.indices && isUnitless(grid_.longitude.variable().text("units")))
-    description_.warnings.push_back(fmt::format("{} and {} have no unit of length; metres are assumed",
-                                                grid_.longitude.variable().name,
-                                                grid_.latitude.variable().name));
+  const std::string unit = grid_.longitude.variable().text("units");
+  if (!grid_.degrees && !grid_.indices && !kilometresOf(unit))
+    description_.warnings.push_back(fmt::format(
+        "{} and {} {}; metres are assumed", grid_.longitude.variable().name, grid_.latitude.variable().name,
+        isUnitless(unit) ? "have no unit of length"
+                         : fmt::format("have the unit '{}', which is no length", unit)));
   if (grid_.indices)
     description_.warnings.push_back(
         fmt::format("{}; the indices of the nodes take their place", missingCoordinates(file_, grid_)));

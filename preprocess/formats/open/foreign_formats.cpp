@@ -38,6 +38,8 @@ constexpr uint64_t kLooked = 16 << 10;  // more than the comments before a text 
 constexpr const char* kAvsUcd = "an AVS UCD mesh, which is not read (meshio convert FILE mesh.vtu)";
 constexpr const char* kFieldView =
     "a FieldView file, which is not read (save it as CGNS, EnSight Gold or PLOT3D)";
+constexpr const char* kOldGmsh =
+    "a Gmsh mesh of version 1, which is not read (gmsh FILE -save -format msh41 -o OUT.msh)";
 constexpr const char* kWebPage = "a web page, perhaps that of a failed download";
 constexpr const char* kUtf16 = "text in UTF-16, which is not read (iconv -f UTF-16 -t UTF-8 FILE)";
 
@@ -66,6 +68,8 @@ constexpr Magic kMagics[] = {
     {"\0\0\0\x10"
      "DIMENS  "sv,
      "an ECLIPSE grid (GRID), which is not read"},
+    {"\xef\xbb\xbf"sv,
+     "text that begins with a byte order mark, which is not read (sed -i '1s/^\\xEF\\xBB\\xBF//' FILE)"},
     {"\xff\xfe"sv, kUtf16},
     {"\xfe\xff"sv, kUtf16},
     {"version https://git-lfs"sv, "a pointer of Git LFS in the place of the file itself (git lfs pull)"},
@@ -292,6 +296,8 @@ constexpr Magic kFirstWords[] = {
     {"/com,ansys"sv,
      "a mesh of Ansys (.cdb), which is not read (save it as CGNS, or as VTK with pymapdl-reader)"},
     {"*keyword"sv, "an input file of LS-DYNA, which is not read (meshio or LS-PrePost convert its mesh)"},
+    {"$nod\n"sv, kOldGmsh},
+    {"$nod\r"sv, kOldGmsh},
     {"ndims = "sv, "a MetaImage, which is not read (save it as VTK's .vti, with ParaView)"},
     {"objecttype = "sv, "a MetaImage, which is not read (save it as VTK's .vti, with ParaView)"},
 };
@@ -300,12 +306,12 @@ constexpr Magic kFirstWords[] = {
 bool isGaussianCube(std::string_view begin) {
   if (begin.find_first_not_of(" \t\r\n+-.0123456789e") > begin.find_first_of("0123456789"))
     return false;  // PLOT3D
-  for (int line = 0; line < 6; ++line) {
+  for (int line = 0; line < 7; ++line) {
     const size_t end = std::min(begin.find('\n'), begin.size());
     const std::vector<std::string_view> words = wordsOf(begin.substr(0, end));
     begin.remove_prefix(std::min(end + 1, begin.size()));
     if (line < 2) continue;
-    if (words.size() < 4 || words.size() > 5) return false;
+    if (words.size() < (line < 6 ? 4 : 5) || words.size() > 5) return false;
     const std::string_view count = words[0].substr(words[0].starts_with('-'));
     if (!countIn(count) || words[1].find_first_not_of("+-.0123456789e") != std::string_view::npos)
       return false;

@@ -88,9 +88,11 @@ struct FoamFile::Parser final : FoamParser {
 
   std::vector<double> tuple(size_t components) {
     std::vector<double> values;
-    if (components > 1) expect("(");
+    skipSpace();
+    const bool enclosed = components > 1 || peek() == '(';  // a spherical tensor: (1)
+    if (enclosed) expect("(");
     for (size_t c = 0; c < components; ++c) values.push_back(number());
-    if (components > 1) expect(")");
+    if (enclosed) expect(")");
     return values;
   }
   void addTuples(uint64_t count, size_t components, Chunks<double>& to) {
@@ -263,7 +265,7 @@ FoamFile::Faces FoamFile::faces() {
 
 std::vector<double> FoamFile::beginField(size_t components) {
   Parser& in = *parser_;
-  const char* const key = type_.ends_with("::Internal") ? "value" : "internalField";
+  const char* const key = type_.find("::") != std::string::npos ? "value" : "internalField";
   if (!in.findEntry(key)) in.fail(fmt::format("has no {}; the file is truncated or not a field", key));
   const std::string word = in.token();
   if (word == "uniform") return in.tuple(components);

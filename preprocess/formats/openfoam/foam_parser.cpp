@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <initializer_list>
 #include <iterator>
 #include <span>
 #include <utility>
@@ -239,8 +240,36 @@ void FoamParser::include(const std::filesystem::path& path, int depth) {
     return;
   }
   FoamParser other(included, included.string());
+  other.entries_ = std::move(entries_);
   other.findEntry("", depth + 1);
-  entries_.merge(other.entries_);
+  entries_ = std::move(other.entries_);
+  if (!other.missing_.empty()) missing_ = other.missing_;
+}
+
+/// Whether `#if WORD` or `#ifeq WORD WORD` holds.
+bool FoamParser::holds(const std::string& condition) {
+  const std::string first = token(), second = condition == "#ifeq" ? token() : "";
+  for (const std::string& word : {first, second})
+    if (word.starts_with('#') || word.starts_with('$')) failValue(word, "a word of " + condition);
+  if (condition == "#ifeq")
+    return first.substr(first.starts_with('"')) == second.substr(second.starts_with('"'));
+  double number = 0;
+  if (parseNumber(first, number)) return number != 0;
+  const auto is_one_of = [&](std::initializer_list<const char*> words) {
+    return std::find(words.begin(), words.end(), first) != words.end();
+  };
+  if (is_one_of({"true", "on", "yes", "y", "t"})) return true;
+  if (!is_one_of({"false", "off", "no", "n", "f", "none"})) failValue(first, "true or false");
+  return false;
+}
+
+/// Goes behind the #else or the #endif of a branch that is not read.
+void FoamParser::skipBranch() {
+  int depth = 0;
+  for (std::string word = nextToken(); !word.empty(); word = nextToken()) {
+    if (depth == 0 && (word == "#else" || word == "#endif")) return;
+    depth += word == "#if" || word == "#ifeq" ? 1 : word == "#endif" ? -1 : 0;
+  }
 }
 
 bool FoamParser::findEntry(const std::string& wanted, int depth) {
@@ -251,7 +280,11 @@ bool FoamParser::findEntry(const std::string& wanted, int depth) {
       if (path.starts_with('"') && path.size() > 1) include(path.substr(1), depth);
     } else if (key == "#inputMode" || key == "#remove") {
       token();
-    } else if (key != ";" && key != "}") {
+    } else if (key == "#if" || key == "#ifeq") {
+      if (!holds(key)) skipBranch();
+    } else if (key == "#else") {  // behind the branch that was read
+      skipBranch();
+    } else if (key != ";" && key != "}" && key != "#endif") {
       std::vector<std::string> tokens = entryTokens();
       if (tokens.size() <= kMaxEntryTokens) entries_[key] = std::move(tokens);
     }

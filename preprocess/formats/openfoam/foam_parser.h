@@ -57,6 +57,8 @@ class FoamParser {
   std::vector<std::string> entryNamed(const std::string& key) const;
   void add(std::string& word, int c) const;
   void include(const std::filesystem::path& path, int depth);
+  bool holds(const std::string& condition);
+  void skipBranch();
 
   InputFile file_;
   std::string name_;

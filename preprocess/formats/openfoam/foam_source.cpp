@@ -31,12 +31,15 @@ namespace fs = std::filesystem;
 
 constexpr uint64_t kChunk = 65536;
 
+/// 0: a field of another kind. Before version 5 one without boundaries is a DimensionedInternalField.
 size_t componentsOf(const std::string& type) {
-  if (type == "volScalarField" || type == "volScalarField::Internal" || type == "volSphericalTensorField")
-    return 1;
-  if (type == "volVectorField" || type == "volVectorField::Internal") return 3;
-  if (type == "volSymmTensorField") return 6;
-  if (type == "volTensorField") return 9;
+  const size_t end = std::min(type.find("::"), type.size());
+  const std::string field = type.substr(0, end), part = type.substr(end);
+  if (!part.empty() && part != "::Internal" && part != "::DimensionedInternalField") return 0;
+  if (field == "volScalarField" || field == "volSphericalTensorField") return 1;
+  if (field == "volVectorField") return 3;
+  if (field == "volSymmTensorField") return 6;
+  if (field == "volTensorField") return 9;
   return 0;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <type_traits>
@@ -252,8 +253,22 @@ void packNumbers(TextReader& text, const std::string& name, uint64_t count, VtkT
     using Stored = decltype(stored);
     std::vector<Stored> piece;
     piece.reserve(kBufferBytes / sizeof(Stored));
+    const auto add = [&](Stored number) {
+      piece.push_back(number);
+      if (piece.size() < piece.capacity()) return;
+      sink(std::as_bytes(std::span(piece)));
+      piece.clear();
+    };
     for (uint64_t n = 0; n < count; ++n) {
       const std::string_view word = text.word();
+      if constexpr (std::is_integral_v<Stored>) {  // exact beyond 2^53
+        Stored whole = 0;
+        const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), whole);
+        if (error == std::errc{} && stop == word.data() + word.size() && !word.empty()) {
+          add(whole);
+          continue;
+        }
+      }
       double value = 0;
       if (word.empty())
         throw Error(
@@ -265,11 +280,9 @@ void packNumbers(TextReader& text, const std::string& name, uint64_t count, VtkT
       if (!fits<Stored>(value))
         throw Error("{}: array {}: {} is not an integer of {} bits", place(), name, value,
                     8 * sizeof(Stored));
-      piece.push_back(static_cast<Stored>(value));
-      if (piece.size() < piece.capacity() && n + 1 < count) continue;
-      sink(std::as_bytes(std::span(piece)));
-      piece.clear();
+      add(static_cast<Stored>(value));
     }
+    if (!piece.empty()) sink(std::as_bytes(std::span(piece)));
   });
 }
 

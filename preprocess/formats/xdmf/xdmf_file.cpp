@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <sstream>
+#include <tuple>
 
 #include "preprocess/formats/common/text_reader.h"
 #include "preprocess/formats/xdmf/xdmf_document.h"
@@ -33,6 +35,7 @@ class Reader {
     if (leaves_.empty()) throw Error("{}: has no Grid", name());
     chooseStep(options);
     leaveOutBareMeshes();
+    joinGridsOfOneMesh();
   }
 
   XdmfFile run() {
@@ -40,7 +43,7 @@ class Reader {
     size_t flat_count = 0;
     std::vector<XdmfGrid> meshes;
     for (const Leaf& leaf : leaves_) {
-      XdmfGrid grid = readGrid(leaf.node);
+      XdmfGrid grid = readGrid(leaf);
       if (grid.cells.count > 0) {
         meshes.push_back(std::move(grid));
         continue;
@@ -74,6 +77,7 @@ class Reader {
   struct Leaf {
     pugi::xml_node node;
     std::optional<double> time;
+    std::vector<pugi::xml_node> attributes = {};
   };
 
   struct Times {
@@ -171,7 +175,58 @@ class Reader {
     });
   }
 
-  XdmfGrid readGrid(const pugi::xml_node& node) {
+  /// Makes one grid of those of one mesh: dolfinx writes a collection of steps for each function, and a run
+  /// that was restarted writes a time again. Where several grids have an attribute of one name, the last is
+  /// read.
+  void joinGridsOfOneMesh() {
+    std::map<std::string, size_t> texts;
+    std::map<pugi::xml_node, size_t> numbers;
+    const auto number_of = [&](const Leaf& leaf, const char* part) {
+      const pugi::xml_node element = document_.resolved(leaf.node.child(part));
+      const auto [found, is_new] = numbers.try_emplace(element);
+      if (is_new) {
+        std::ostringstream text;
+        element.print(text, "", pugi::format_raw);
+        found->second = texts.try_emplace(std::move(text).str(), texts.size()).first->second;
+      }
+      return found->second;
+    };
+    std::map<std::pair<size_t, size_t>, size_t> place_of_mesh;
+    std::map<std::tuple<size_t, std::string, std::string>, pugi::xml_node>
+        last;  // the grid that has an attribute
+    std::vector<Leaf> joined;
+    std::vector<size_t> places;
+    for (const Leaf& leaf : leaves_) {
+      const bool whole = leaf.node.child("Topology") && leaf.node.child("Geometry");
+      const std::pair mesh(number_of(leaf, "Topology"), number_of(leaf, "Geometry"));
+      const size_t place =
+          whole ? place_of_mesh.try_emplace(mesh, joined.size()).first->second : joined.size();
+      if (place == joined.size()) joined.push_back(leaf);
+      places.push_back(place);
+      for (const pugi::xml_node attribute : leaf.node.children("Attribute")) {
+        const auto [found, is_new] = last.try_emplace(keyOf(place, document_.resolved(attribute)), leaf.node);
+        if (!is_new && found->second != leaf.node)
+          warn(fmt::format("several grids of one mesh have the attribute {}{}; the last one is read",
+                           std::get<1>(found->first),
+                           leaf.time ? fmt::format(" at time {:g}", *leaf.time) : ""));
+        found->second = leaf.node;
+      }
+    }
+    for (size_t n = 0; n < leaves_.size(); ++n)
+      for (const pugi::xml_node given : leaves_[n].node.children("Attribute"))
+        if (const pugi::xml_node attribute = document_.resolved(given);
+            last.at(keyOf(places[n], attribute)) == leaves_[n].node)
+          joined[places[n]].attributes.push_back(attribute);
+    leaves_ = std::move(joined);
+  }
+
+  /// An attribute of the grid at `place`: its name and centring.
+  static std::tuple<size_t, std::string, std::string> keyOf(size_t place, const pugi::xml_node& attribute) {
+    return {place, xdmfAttribute(attribute, {"Name"}), lowerCase(xdmfAttribute(attribute, {"Center"}))};
+  }
+
+  XdmfGrid readGrid(const Leaf& leaf) {
+    const pugi::xml_node& node = leaf.node;
     XdmfGrid grid;
     attributes_of_grid_.clear();
     grid.name = xdmfAttribute(node, {"Name"});
@@ -187,7 +242,7 @@ class Reader {
             "{} has the topology {}, which is not read; expected 3DSMesh, 3DRectMesh, 3DCoRectMesh, Mixed, "
             "Tetrahedron, Hexahedron or the like",
             document_.describe(node), printable(type.substr(0, 40)));
-      readMesh(node, topology, xdmfCellTypeNamed(small), grid);
+      readMesh(leaf, topology, xdmfCellTypeNamed(small), grid);
       return grid;
     }
     const std::vector<uint64_t> counts =
@@ -204,14 +259,13 @@ class Reader {
     }
     if (std::any_of(grid.nodes.begin(), grid.nodes.end(), [](uint64_t n) { return n < 2; })) return grid;
     readGeometry(document_.resolved(node.child("Geometry")), grid, document_.describe(node));
-    for (const pugi::xml_node attribute : node.children("Attribute"))
-      readAttribute(document_.resolved(attribute), grid);
+    for (const pugi::xml_node& attribute : leaf.attributes) readAttribute(attribute, grid);
     return grid;
   }
 
   /// `type`: null for Mixed. Without solid cells the grid stays without points.
-  void readMesh(const pugi::xml_node& node, const pugi::xml_node& topology, const XdmfCellType* type,
-                XdmfGrid& grid) {
+  void readMesh(const Leaf& leaf, const pugi::xml_node& topology, const XdmfCellType* type, XdmfGrid& grid) {
+    const pugi::xml_node& node = leaf.node;
     const pugi::xml_node geometry = document_.resolved(node.child("Geometry")),
                          first = geometry.child("DataItem");
     if (type && type->shape == CellKind::kNone) {
@@ -249,9 +303,8 @@ class Reader {
         (cells.nodes_each > 0 && cells.connectivity->size() % cells.nodes_each != 0))
       throw Error("{} has {} numbers, which are {} cells; expected {}", document_.describe(topology),
                   cells.connectivity->size(), cells.count, expected);
-    takeCellsApart(node, grid);
-    for (const pugi::xml_node attribute : node.children("Attribute"))
-      readAttribute(document_.resolved(attribute), grid);
+    takeCellsApart(leaf, grid);
+    for (const pugi::xml_node& attribute : leaf.attributes) readAttribute(attribute, grid);
   }
 
   /// Refuses an Order of the points of a cell other than 0 1 2 ..., which no writer that is known uses.
@@ -376,16 +429,16 @@ class Reader {
   }
 
   /// Gives each cell points of its own where a function jumps between cells, or has values between their corners.
-  void takeCellsApart(const pugi::xml_node& node, XdmfGrid& grid) {
+  void takeCellsApart(const Leaf& leaf, XdmfGrid& grid) {
     XdmfCells& cells = grid.cells;
-    for (const pugi::xml_node attribute : node.children("Attribute")) {
-      const auto function = functionOf(document_.resolved(attribute));
+    for (const pugi::xml_node& attribute : leaf.attributes) {
+      const auto function = functionOf(attribute);
       if (function && function->isRead(cells) && function->each() > 1 &&
           (function->family == "DG" || function->degree == "2" || cells.nodes_each > 4))
         cells.own_points = std::max({cells.own_points, cells.nodes_each, function->each()});
     }
     if (cells.own_points == 0) return;
-    const std::string where = document_.describe(node);
+    const std::string where = document_.describe(leaf.node);
     const std::vector<std::shared_ptr<const XdmfValues>> all(grid.places.begin(), grid.places.end());
     cells.curved = cells.own_points > 4;
     nodes_of_file_ = grid.nodes[0];

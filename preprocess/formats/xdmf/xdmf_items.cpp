@@ -116,6 +116,9 @@ std::filesystem::path XdmfItems::existing(const pugi::xml_node& item, const std:
 
 std::shared_ptr<const XdmfValues> XdmfItems::readHdf5(const pugi::xml_node& item, const std::string& text,
                                                       std::vector<uint64_t> dims) {
+  if (const size_t bar = text.find('|'); bar != std::string::npos)
+    throw XdmfComputedItem("{} selects a part of its data, \"{}\", which is not read; write a HyperSlab",
+                           document_.describe(item), printable(text.substr(bar, 40)));
   const size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon + 1 == text.size())
     throw Error("{} has \"{}\"; expected FILE:/DATA", document_.describe(item),
