@@ -99,8 +99,7 @@ class SetsConversion {
     ConvertReport report = convert_(options_, [&](const std::filesystem::path& folder) {
       std::vector<OwnBlanks> made;
       for (size_t n = 1; n < found_.sets.size(); ++n)
-        if (auto set = convertSet(found_.sets[n].scalars, folder / ownBlanksFolderName(made.size())))
-          made.push_back(std::move(*set));
+        made.push_back(convertSet(found_.sets[n].scalars, folder / ownBlanksFolderName(n - 1)));
       return made;
     });
     addOwnBlanksTo(report);
@@ -110,8 +109,8 @@ class SetsConversion {
 
  private:
   /// Converts scalars that have blanks of their own to a cache in `folder`, unless an interrupted conversion has. Returns what
-  /// the manifest of the whole cache says of it; nullopt if no cell of a mesh has values at all its points.
-  std::optional<OwnBlanks> convertSet(const Scalars& scalars, const std::filesystem::path& folder) try {
+  /// the manifest of the whole cache says of it.
+  OwnBlanks convertSet(const Scalars& scalars, const std::filesystem::path& folder) {
     ConvertOptions options = options_;
     options.output = folder;
     options.scalars = scalars;
@@ -135,11 +134,7 @@ class SetsConversion {
                     "--scalar draws {}",
                     listed(scalars), one ? "has" : "have", listed(options_.scalars),
                     written.nodes - written.blanked_nodes, one ? "it is" : "they are", one ? "it" : "each"));
-    return OwnBlanks{namesOf(description_, scalars), checksumOf(std::as_bytes(std::span(text)))};
-  } catch (const NothingToDraw&) {
-    of_sets_.warnings.push_back(
-        fmt::format("left out: {}, without values at all points of any cell", listed(scalars)));
-    return std::nullopt;
+    return {namesOf(description_, scalars), checksumOf(std::as_bytes(std::span(text)))};
   }
 
   void addOwnBlanksTo(ConvertReport& report) {

@@ -237,25 +237,6 @@ class MeshFiles(MeshCase):
         found = [[float(row[at] or "nan") for at in columns] for row in rows[1:]]
         np.testing.assert_allclose(found, [[3, 3, 3], [4, 4, 3], [5, 5, np.nan]], atol=0.01)
 
-    def test_a_scalar_without_values_at_all_points_of_any_cell(self):
-        """It is left out; the others are drawn where they have values."""
-        points = lattice(1)
-        grid = vtk.vtkUnstructuredGrid()
-        grid.SetPoints(vtk.vtkPoints())
-        grid.GetPoints().SetData(numpy_to_vtk(points, deep=True))
-        insert(grid, vtk.VTK_HEXAHEDRON, hexahedra(1)[0])
-        for name, values in (("holed", np.where(points[:, 0] > 0, np.nan, 1)), ("whole", points[:, 0].copy())):
-            array = numpy_to_vtk(values, deep=True)
-            array.SetName(name)
-            grid.GetPointData().AddArray(array)
-        path, cache = self.folder / "a.vtu", self.folder / "a.splats"
-        write_xml(grid, path)
-        result = self.run_program("convert", path, "-o", cache)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn("left out: holed, without values at all points of any cell", result.stderr)
-        whole = self.info(cache, "--verify")
-        self.assertEqual(([v["name"] for v in whole["variables"]], whole.get("own_blanks", [])), (["whole"], []))
-
     def test_own_blanks_are_drawn_and_checked(self):
         """Scalars that have a value nowhere together, and one that has none."""
         image = vtk.vtkImageData()
