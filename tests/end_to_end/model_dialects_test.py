@@ -4,7 +4,6 @@
 NetCDF files as particular models and archives write them: CESM's POP, COSMO, MERRA-2, ERA5. model_files.py says how. Exit status 77
 (skipped) without python3-netcdf4.
 """
-import json
 import subprocess
 import unittest
 
@@ -597,25 +596,6 @@ class Fields(ModelFileTest):
             f.add("T", "Time bottom_top south_north west_east", RANDOM.random((1, 4, 8, 12)), "f4", units="K")
         info = self.info()
         self.assertEqual([s["name"] for s in info["scalars"]], ["T"])
-
-    def test_slices_of_a_series_have_their_times(self):
-        """As iris, xarray and cfgrib save one time: as a scalar; of a forecast also when it began."""
-        for forecast in (False, True):
-            paths = []
-            for n, day in enumerate((3, 8, 20)):
-                with self.file(f"s_{n}.nc", lon=12, lat=8, lev=3) as f:
-                    self.air(f)
-                    f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
-                    f.add("time", "", 0 if forecast else day, units="days since 2000-01-01", standard_name="time")
-                    if forecast:
-                        f.add("valid_time", "", day, units="days since 2000-01-01", standard_name="time")
-                    f.add("T", "lev lat lon", RANDOM.random((3, 8, 12)), "f4", coordinates="time valid_time" if forecast else "time")
-                paths.append(self.folder / f"s_{n}.nc")
-            self.assertEqual(self.info("s_1.nc")["times"], [8])
-            cache = self.folder / "s.splats"
-            subprocess.run([PROGRAM, "convert", *paths, "-o", cache, "--overwrite"], check=True, capture_output=True)
-            told = json.loads(subprocess.run([PROGRAM, "info", "--json", cache], check=True, capture_output=True).stdout)
-            self.assertEqual([step["time"] for step in told["steps"]], [3, 8, 20])
 
     def test_months_and_members_are_steps(self):
         t = RANDOM.random((5, 3, 8, 12)).astype("f4")

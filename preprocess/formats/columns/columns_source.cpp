@@ -92,11 +92,6 @@ void ColumnsSource::findTimes(const OpenGridOptions& options) {
     }
     if (dimension.length == 0)
       throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(), dimension.name);
-  } else {
-    const CfTimes time = cfTimeOfSlice(file_);
-    description_.times = time.values;
-    description_.time_unit = time.unit;
-    description_.calendar = time.calendar;
   }
   description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
 }

@@ -485,29 +485,9 @@ bool isOcean(const NetcdfFiles& file, const CfGrid& grid) {
   return column.front() + column.back() < 0;
 }
 
-CfTimes cfTimeOfSlice(const NetcdfFiles& file) {
-  const NetcdfVariable* time = nullptr;
-  for (const NetcdfVariable& variable : file.variables()) {
-    const std::string standard_name = lowerCase(variable.text("standard_name"));
-    const bool one = std::all_of(variable.dims.begin(), variable.dims.end(),
-                                 [&](size_t dim) { return file.dimensions()[dim].length == 1; });
-    if (!variable.numeric || !one || cfRole(file, variable) != CfRole::kTime ||
-        !(standard_name.empty() || standard_name == "time"))
-      continue;
-    // In forecasts `time` is when they began.
-    if (!time || variable.name == "valid_time") time = &variable;
-  }
-  if (!time) return {};
-  std::vector<double> value(1);
-  const size_t rank = time->dims.size();
-  file.read(*time, {std::vector<uint64_t>(rank, 0), std::vector<uint64_t>(rank, 1)}, value);
-  if (!std::isfinite(value[0])) return {};
-  return {value, time->text("units"), lowerCase(time->text("calendar"))};
-}
-
 CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
-  if (!grid.dims.time) return cfTimeOfSlice(file);
   CfTimes times;
+  if (!grid.dims.time) return times;
   const NetcdfDimension& time = file.dimensions()[*grid.dims.time];
   times.values.resize(time.length);
   for (size_t n = 0; n < time.length; ++n) times.values[n] = static_cast<double>(n);

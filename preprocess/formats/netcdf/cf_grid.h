@@ -65,12 +65,9 @@ bool isOcean(const NetcdfFiles& file, const CfGrid& grid);
 
 /// The times of a grid's steps.
 struct CfTimes {
-  std::vector<double> values;  // empty if the grid has no time
+  std::vector<double> values;  // empty if the grid has no time dimension
   std::string unit, calendar;  // "days since 1950-01-01"; may be empty
 };
-
-/// The time that a single value states, where there is no dimension of time: a slice of a series.
-CfTimes cfTimeOfSlice(const NetcdfFiles& file);
 
 /// The time of every step of a grid: values of the time coordinate, seconds since the first of WRF's Times, or
 /// 0, 1, ... if there is neither.
