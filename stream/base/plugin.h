@@ -13,7 +13,7 @@ namespace curvisplat {
 /// Returns nullptr, with the reason in `why_not`, if there is none or it cannot be loaded. Any thread.
 void* openPlugin(const char* name, int flags, std::string& why_not);
 
-/// What to do about a plug-in that could not be loaded, for the end of a message: raise the limit of memory where that is the reason
+/// Returns what to do about a plug-in that could not be loaded, for the end of a message: raise the limit of memory, where it is the reason
 /// (ulimit -v), else install the program again.
 const char* pluginAdvice(std::string_view why_not);
 

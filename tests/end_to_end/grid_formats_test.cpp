@@ -35,7 +35,7 @@ TEST_F(GridFormats, AnOceanOnTheSphereAndOnTheMap) {
   const std::string roms_file = file("roms.nc");
   roms::write(roms_file, NetcdfFileType::kNetcdf4Compressed, "ocean_s_coordinate_g2");
   // The next word after --sphere is the grid, not a radius.
-  convert({"--sphere", roms_file, "--vertical-scale", "100"}, file("sphere.splats"));
+  convert({"--sphere", roms_file, "--vertical-scale", "100", "--refine", "1"}, file("sphere.splats"));
   const Manifest sphere = CacheReader(file("sphere.splats")).manifest();
   EXPECT_EQ(sphere.variables.at(0).name, "temp");
   EXPECT_EQ(sphere.blanked_nodes, 4 * roms::kLevels);

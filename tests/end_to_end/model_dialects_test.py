@@ -441,16 +441,19 @@ class Places(ModelFileTest):
                 f.add("t", "lev y x", t, "f4", coordinates="x y" if dims == 1 else "cx cy")
             self.expect(self.info(), sphere(lon, lat, np.array([0, 1, 3])[:, None, None]), t)
 
-    def test_degrees_west_and_south(self):
-        """UDUNITS has these as -1 degree_east and -1 degree_north."""
+    def test_degrees_west(self):
+        """Files that have this unit count to the east all the same: their longitudes are negative in the west."""
         t = RANDOM.random((3, 8, 12)).astype("f4")
-        west, south = 10.0 + np.arange(12), 40.0 + np.arange(8)
+        lon, lat = -20.0 + np.arange(12), 40.0 + np.arange(8)
         with self.file(lon=12, lat=8, lev=3) as f:
-            f.add("lon", "lon", west, units="degrees_west")
-            f.add("lat", "lat", south, units="degrees_south")
+            f.add("lon", "lon", lon, units="degrees_west", standard_name="longitude")
+            f.add("lat", "lat", lat, units="degrees_west", standard_name="latitude")
             f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
             f.add("t", "lev lat lon", t, "f4")
-        self.expect(self.info(), sphere(*np.meshgrid(-west, -south), np.array([0, 1, 3])[:, None, None]), t)
+        told = self.info()
+        self.expect(told, sphere(*np.meshgrid(lon, lat), np.array([0, 1, 3])[:, None, None]), t)
+        self.assertIn("lon has the unit 'degrees_west', and is read as degrees east; if it counts to the west, change its sign "
+                      "(ncap2 -s 'lon=-lon' IN OUT)", told["warnings"])
 
     def test_places_in_a_unit_of_no_length(self):
         for unit in ("rad", "pixel"):

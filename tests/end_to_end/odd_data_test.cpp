@@ -193,7 +193,8 @@ TEST_F(OddDataTest, NonFiniteSamplesAreCountedSkippedAndReported) {
     if (number.k == 4 && number.j == 5) values.position.y = infinity;
   };
   writeCube(folder_ / "cube", 8, node);
-  const ProgramResult result = run(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
+  const ProgramResult result =
+      run(cubeArguments(folder_ / "cube", {"--stats", file("stats.json"), "--refine", "1"}));
   expectSays(result.err,
              "note: 208 samples are not finite in single precision (NaN, infinite, or a value "
              "beyond 3.4e+38 in magnitude) and are blanked");

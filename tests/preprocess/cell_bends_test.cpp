@@ -225,7 +225,7 @@ TEST(RefinementByNeed, HalvesCellsOfSmallBlocksThatEndInStairs) {
   EXPECT_EQ(refinementByNeed(sea(Land::kStairs, 16, true, -99), {0}, -99).ofBlock(0), halves);
 }
 
-/// What a block blanks may be drawn by another, as coarser cells are below finer ones.
+/// Nodes that a block blanks may be drawn by another one, as coarser cells are by finer ones.
 TEST(RefinementByNeed, LeavesStairsThatAnotherBlockMayFill) {
   const auto two_blocks = [](double second_from) {
     GridBlock block = gridBlock(16, 16, 16);

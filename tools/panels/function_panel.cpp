@@ -180,12 +180,13 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
   paintHeights(canvas);
   if (const auto shown = dragged_ ? dragged_ : near) {
     const OpacityPoint& point = function.points()[*shown];
-    const std::string text = fmt::format(
-        "{:.6g}: opacity {:.4g}; {:.3g} % of the volume above\nright click to remove\n"
-        "Shift + drag moves all",
-        function.scalarAt(point.x), point.opacity, 100 * shareAbove(histogram_, point.x));
-    ImGui::SetTooltip("%s", text.c_str());
-    nameWithoutTab("point: " + text.substr(0, text.find('\n')));
+    const std::string opacity =
+        fmt::format("{:.6g}: opacity {:.4g}", function.scalarAt(point.x), point.opacity);
+    const std::string above =
+        fmt::format("{:.3g} % of the volume above", 100 * shareAbove(histogram_, point.x));
+    ImGui::SetTooltip("%s\n%s\nright click to remove\nShift + drag moves all", opacity.c_str(),
+                      above.c_str());
+    nameWithoutTab("point: " + opacity + "; " + above);
   } else if (over) {
     const double x = static_cast<double>(canvas.xOf(mouse));
     const auto bin = static_cast<size_t>(x * static_cast<double>(histogram_.size()));

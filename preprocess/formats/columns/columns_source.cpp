@@ -65,8 +65,8 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
   const auto length = kilometresOf(unit);
   const bool radians =
       unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID" && map_.format != "FESOM");
-  const bool plane =
-      length.has_value() || map_.longitude->name == "xVertex" || cfRole(file_, *map_.longitude) == CfRole::kX;
+  const bool plane = length.has_value() || map_.longitude->name == "xVertex" ||
+                     (isUnitless(unit) && cfRole(file_, *map_.longitude) == CfRole::kX);
   if (plane && !length && map_.format == "UGRID")
     description_.warnings.push_back(fmt::format("{} and {} have no unit of length; metres are assumed",
                                                 map_.longitude->name, map_.latitude->name));
@@ -215,23 +215,28 @@ void ColumnsSource::requireDegrees() const {
   if (!globe_.degrees()) return;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::array<double, 2> least{kInfinity, kInfinity}, most{-kInfinity, -kInfinity};
-  uint64_t wrong = 0;
+  uint64_t there = 0, wrong = 0;
   for (uint64_t first = 0; first < map_.nodes; first += kFacesAtOnce) {
     const uint64_t count = std::min(kFacesAtOnce, map_.nodes - first);
     const std::array angles{readAngles(*map_.longitude, first, count),
                             readAngles(*map_.latitude, first, count)};
-    for (uint64_t n = 0; n < count; ++n) wrong += !isOnEarth(angles[0][n], angles[1][n]);
+    for (uint64_t n = 0; n < count; ++n) {
+      if (!std::isfinite(angles[0][n]) || !std::isfinite(angles[1][n]))
+        continue;  // a node that the mesh lacks
+      ++there;
+      wrong += !isOnEarth(angles[0][n], angles[1][n]);
+    }
     for (size_t axis = 0; axis < 2; ++axis)
       for (const double angle : angles[axis]) {
         least[axis] = std::min(least[axis], angle);
         most[axis] = std::max(most[axis], angle);
       }
   }
-  if (2 * wrong > map_.nodes)
+  if (2 * wrong > there)
     throw Error(
         "{}: {} is {:g} .. {:g} and {} is {:g} .. {:g} degrees, which are no longitudes and latitudes: "
         "lengths "
-        "need a unit of length (ncatted -a units,{},o,c,m FILE)",
+        "need a unit of length (ncatted -a units,{},o,c,m FILE), degrees degrees_east and degrees_north",
         file_.path().string(), map_.longitude->name, least[0], most[0], map_.latitude->name, least[1],
         most[1], map_.longitude->name);
 }
@@ -298,7 +303,9 @@ void ColumnsSource::noteSagitta() {
     double count = 0;
     for (const int64_t node : nodes) {
       if (node < 0) continue;
-      sum += globe_.column(longitude[static_cast<size_t>(node)], latitude[static_cast<size_t>(node)]);
+      const double east = longitude[static_cast<size_t>(node)], north = latitude[static_cast<size_t>(node)];
+      if (!isOnEarth(east, north)) return;  // it is blanked
+      sum += globe_.column(east, north);
       ++count;
     }
     if (const double depth = 1 - glm::length(sum) / count; depth > deepest) deepest = depth;

@@ -12,7 +12,13 @@
 namespace curvisplat {
 
 double readGmshFormat(GmshReader& reader) {
-  while (reader.requiredLine() == "$Comments") reader.skipTo("$EndComments");
+  std::string section = reader.requiredLine();
+  for (; section == "$Comments"; section = reader.requiredLine()) reader.skipTo("$EndComments");
+  if (!section.starts_with("$MeshFormat"))
+    throw Error(
+        "{}: has no $MeshFormat: it is of Gmsh's version 1; save it so (gmsh FILE -save -format msh41 -o "
+        "OUT.msh)",
+        reader.name());
   const double version = reader.textNumber(), binary = reader.textNumber(), bytes = reader.textNumber();
   if (version != 4.1 && version != 4 && version != 2 && version != 2.1 && version != 2.2)
     throw Error(

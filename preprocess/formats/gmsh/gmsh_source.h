@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-/// Whether the file begins with $MeshFormat.
+/// Whether the file begins with $MeshFormat, or with $Comments.
 bool isGmsh(const InputFile& file);
 
 /// The number of files that Gmsh saved the mesh of this one in, by its partitions; 1 if it does not say, or is none of Gmsh.

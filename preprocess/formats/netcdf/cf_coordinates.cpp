@@ -68,12 +68,10 @@ CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
   const std::string axis = lowerCase(variable.text("axis"));
   if (standard_name == "grid_longitude") return CfRole::kGridLongitude;
   if (standard_name == "grid_latitude") return CfRole::kGridLatitude;
-  if (isOneOf(units, {"degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese",
-                      "degrees_west", "degree_west"}) ||
+  if (isOneOf(units, {"degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese"}) ||
       isOneOf(standard_name, {"longitude", "geographic_longitude"}))
     return CfRole::kLongitude;
-  if (isOneOf(units, {"degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn",
-                      "degrees_south", "degree_south"}) ||
+  if (isOneOf(units, {"degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn"}) ||
       isOneOf(standard_name, {"latitude", "geographic_latitude"}))
     return CfRole::kLatitude;
   // Angles that only a long_name tells: "longitude", but not "longitude in rotated pole grid".
@@ -111,9 +109,7 @@ bool isUnitless(const std::string& unit) {
 }
 
 double degreesOf(const std::string& unit) {
-  const std::string small = lowerCase(unit);
-  if (isOneOf(small, {"degrees_west", "degree_west", "degrees_south", "degree_south"})) return -1;
-  return isOneOf(small, {"radian", "radians", "rad"}) ? 180 / std::numbers::pi : 1;
+  return isOneOf(lowerCase(unit), {"radian", "radians", "rad"}) ? 180 / std::numbers::pi : 1;
 }
 
 namespace {

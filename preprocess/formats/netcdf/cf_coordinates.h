@@ -29,7 +29,7 @@ enum class CfRole {
 /// Source: CF conventions 1.10, chapter 4.
 CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable);
 
-/// Degrees in the unit of an angle, to the east or north: -1 for degrees_west.
+/// Degrees in the unit of an angle: 1 unless it is the radian.
 double degreesOf(const std::string& unit);
 
 /// Whether a unit says that there is none: "", "1", "-", "none", ...

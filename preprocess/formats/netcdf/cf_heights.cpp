@@ -147,7 +147,8 @@ CfValues CfVertical::formulaHeights(const NetcdfFiles& file, const CfRange& rang
   CfValues depth = depth_ ? depth_->read(file, range) : none;
   if (pressure)
     for (double& value : depth.values)
-      value = log_surface_ ? std::exp(value) : depth_ ? depth_c_ * value : kSeaLevelPressure;
+      // Programs that take the exponential keep the name of the logarithm, which is below 12.
+      value = log_surface_ && value < 20 ? std::exp(value) : depth_ ? depth_c_ * value : kSeaLevelPressure;
   const CfValues c = c_ ? c_->read(file, range) : none, eta = eta_ ? eta_->read(file, range) : none;
   const CfValues c2 = c2_ ? c2_->read(file, range) : none,
                  depth2 = depth2_ ? depth2_->read(file, range) : none;

@@ -18,6 +18,7 @@
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
 #include "stream/base/name_list.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -260,6 +261,11 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
         "{} and {} {}; metres are assumed", grid_.longitude.variable().name, grid_.latitude.variable().name,
         isUnitless(unit) ? "have no unit of length"
                          : fmt::format("have the unit '{}', which is no length", unit)));
+  if (const std::string small = lowerCase(unit); small == "degrees_west" || small == "degree_west")
+    description_.warnings.push_back(fmt::format(
+        "{0} has the unit '{1}', and is read as degrees east; if it counts to the west, change its sign "
+        "(ncap2 -s '{0}=-{0}' IN OUT)",
+        grid_.longitude.variable().name, unit));
   if (grid_.indices)
     description_.warnings.push_back(
         fmt::format("{}; the indices of the nodes take their place", missingCoordinates(file_, grid_)));

@@ -246,14 +246,20 @@ void FoamParser::include(const std::filesystem::path& path, int depth) {
   if (!other.missing_.empty()) missing_ = other.missing_;
 }
 
-/// Whether `#if WORD` or `#ifeq WORD WORD` holds.
+/// Whether `#if WORD`, `#ifeq WORD WORD` or `#ifeq (WORD WORD)` holds. Numbers are compared as such.
 bool FoamParser::holds(const std::string& condition) {
-  const std::string first = token(), second = condition == "#ifeq" ? token() : "";
+  std::string first = token();
+  const bool enclosed = condition == "#ifeq" && first == "(";
+  if (enclosed) first = token();
+  const std::string second = condition == "#ifeq" ? token() : "";
+  if (enclosed) expect(")");
   for (const std::string& word : {first, second})
     if (word.starts_with('#') || word.starts_with('$')) failValue(word, "a word of " + condition);
+  double number = 0, other = 0;
   if (condition == "#ifeq")
-    return first.substr(first.starts_with('"')) == second.substr(second.starts_with('"'));
-  double number = 0;
+    return parseNumber(first, number) && parseNumber(second, other)
+               ? number == other
+               : first.substr(first.starts_with('"')) == second.substr(second.starts_with('"'));
   if (parseNumber(first, number)) return number != 0;
   const auto is_one_of = [&](std::initializer_list<const char*> words) {
     return std::find(words.begin(), words.end(), first) != words.end();
@@ -268,6 +274,7 @@ void FoamParser::skipBranch() {
   int depth = 0;
   for (std::string word = nextToken(); !word.empty(); word = nextToken()) {
     if (depth == 0 && (word == "#else" || word == "#endif")) return;
+    if (depth == 0 && word == "#elif") failValue(word, "#else or #endif");
     depth += word == "#if" || word == "#ifeq" ? 1 : word == "#endif" ? -1 : 0;
   }
 }
@@ -282,6 +289,8 @@ bool FoamParser::findEntry(const std::string& wanted, int depth) {
       token();
     } else if (key == "#if" || key == "#ifeq") {
       if (!holds(key)) skipBranch();
+    } else if (key == "#elif") {
+      failValue(key, "#else or #endif");
     } else if (key == "#else") {  // behind the branch that was read
       skipBranch();
     } else if (key != ";" && key != "}" && key != "#endif") {

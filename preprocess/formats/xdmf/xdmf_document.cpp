@@ -238,8 +238,12 @@ void XdmfDocument::replaceIncludes() {
     if ((included += found->second.size()) > kMaxIncluded)
       throw Error("{}: includes more than {} elements; write the grids out", name(), kMaxIncluded);
     pugi::xml_node parent = include.parent();
-    for (const pugi::xml_node& part : found->second)
-      included_.emplace(parent.insert_child_before(part.name(), include), part);
+    for (const pugi::xml_node& part : found->second) {
+      pugi::xml_node place = parent.insert_child_before(part.name(), include);
+      // Elements whose texts are alike include the same.
+      place.append_attribute("included").set_value(static_cast<unsigned long long>(part.hash_value()));
+      included_.emplace(place, part);
+    }
   }
   for (pugi::xml_node include : includes) include.parent().remove_child(include);
 }

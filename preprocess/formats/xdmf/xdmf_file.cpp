@@ -179,6 +179,8 @@ class Reader {
   /// that was restarted writes a time again. Where several grids have an attribute of one name, the last is
   /// read.
   void joinGridsOfOneMesh() {
+    constexpr size_t kMaxCompared = 64 << 20;
+    size_t compared = 0;
     std::map<std::string, size_t> texts;
     std::map<pugi::xml_node, size_t> numbers;
     const auto number_of = [&](const Leaf& leaf, const char* part) {
@@ -187,6 +189,8 @@ class Reader {
       if (is_new) {
         std::ostringstream text;
         element.print(text, "", pugi::format_raw);
+        if ((compared += text.view().size()) > kMaxCompared)
+          throw Error("{}: its grids refer to too much text", document_.name());
         found->second = texts.try_emplace(std::move(text).str(), texts.size()).first->second;
       }
       return found->second;
@@ -222,7 +226,8 @@ class Reader {
 
   /// An attribute of the grid at `place`: its name and centring.
   static std::tuple<size_t, std::string, std::string> keyOf(size_t place, const pugi::xml_node& attribute) {
-    return {place, xdmfAttribute(attribute, {"Name"}), lowerCase(xdmfAttribute(attribute, {"Center"}))};
+    const std::string centre = lowerCase(xdmfAttribute(attribute, {"Center"}));
+    return {place, xdmfAttribute(attribute, {"Name"}), centre.empty() ? "node" : centre};
   }
 
   XdmfGrid readGrid(const Leaf& leaf) {
