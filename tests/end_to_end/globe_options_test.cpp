@@ -359,7 +359,7 @@ TEST_F(GlobeOptions, LayersThatAreSeenAsOneAreExplained) {
   writeSea(*folder_ / "layers.nc", -5, 40, 0);
   run({"convert", file("layers.nc"), "-o", file("layers.splats")});
   expectSays(run({"render", file("layers.splats"), "-o", file("a.png"), "--size", "200x160"}).err,
-             "the picture is of one colour; layers above one another are seen as one: convert with "
+             "the picture is of one colour; if layers above one another are seen as one, convert with "
              "--vertical-scale 50; or try --range 1%,99%");
 }
 

@@ -258,15 +258,18 @@ class MeshFoam(MeshCase):
                   "c": ('outer 5;\n#include "values"\nouter 6;\n', "$inner", 5),
                   "d": ("k x;\nv 1;\n#ifeq $k x\nv 2;\n#else\nv 3;\n#endif\n", "$v", 2),
                   "e": ("k x;\n#ifeq $k y\n#if 1\nv 1;\n#else\nv 4;\n#endif\nv 2;\n#else\nv 3;\n#endif\n", "$v", 3),
-                  "f": ("v 1;\n#if off\nv 2;\n#endif\n", "$v", 1), "g": ("v 1;\n#if true\nv 2;\n#endif\n", "$v", 2)}
+                  "f": ("v 1;\n#if off\nv 2;\n#endif\n", "$v", 1), "g": ("v 1;\n#if true\nv 2;\n#endif\n", "$v", 2),
+                  "i": ("v 1;\n#ifeq 1 1.0\nv 2;\n#endif\n", "$v", 2), "j": ("k x;\nv 1;\n#ifeq ($k x)\nv 2;\n#endif\n", "$v", 2)}
         for name, (entries, value, _) in fields.items():
             writer.write(case / "0" / name, "volScalarField", entries, head, f"internalField uniform {value};\n")
-        writer.write(case / "0" / "h", "volScalarField", "v 1;\n#if $unknown\nv 2;\n#endif\n", head, "internalField uniform $v;\n")
+        for name, condition in (("h", "#if $unknown"), ("l", "#if 0\nv 3;\n#elif 1")):
+            writer.write(case / "0" / name, "volScalarField", f"v 1;\n{condition}\nv 2;\n#endif\n", head, "internalField uniform $v;\n")
         info = self.info(case)
         scalars = {scalar["name"]: scalar["max"] for scalar in info["scalars"]}
         self.assertEqual({name: scalars.get(name) for name in fields}, {name: value for name, (_, _, value) in fields.items()})
         self.assertIn('has "$unknown" in the place of a word of #if', "".join(info["warnings"]))
-        self.assertNotIn("h", scalars)
+        self.assertIn('has "#elif" in the place of #else or #endif', "".join(info["warnings"]))
+        self.assertFalse({"h", "l"} & set(scalars))
 
     def test_spherical_tensors_and_fields_without_boundaries_of_old_versions(self):
         case, p, _ = self.foam_case()

@@ -70,6 +70,8 @@ class MeshGmsh(MeshCase):
             path = self.written(grid, 4.1, order)
             path.write_bytes(b"$Comments\nmade by hand\n$EndComments\n" + path.read_bytes())
             self.assertEqual(self.info(path)["cells"]["count"], grid.GetNumberOfCells())
+        path.write_text("$Comments\n$EndComments\n$NOD\n4\n1 0 0 0\n")
+        self.expect_line(path, words="has no $MeshFormat: it is of Gmsh's version 1")
 
     def test_cells_of_second_order(self):
         grid = cube(kinds=("quadratic",))

@@ -155,6 +155,17 @@ class XdmfMeshes(MeshFormats):
                               ("xpointer(count(//*))", "is not read"), ("xpointer(//Grid[@Name='mesh']/Topology[", "includes xpointer")):
             self.expect_line(self.included(mesh, 'Version="3.0"', "xi", pointer), words=told)
 
+    def test_blocks_whose_points_are_included(self):
+        """They are two, although their texts are alike."""
+        mesh = Mesh(2)
+        whole = self.grid(mesh, self.mixed(mesh))
+        items = [f'<DataItem Name="{name}" Dimensions="{len(points)} 3">{" ".join(map(str, points.ravel()))}</DataItem>'
+                 for name, points in (("a", mesh.points), ("b", mesh.points + [9, 0, 0]))]
+        start = whole.index("<Geometry")
+        grids = [whole[:start] + f"""<Geometry GeometryType="XYZ"><xi:include xpointer="xpointer(/Xdmf/Domain/DataItem[@Name='{name}'])"/>"""
+                 + whole[whole.index("</Geometry>"):] for name in "ab"]
+        self.assertEqual(self.info(self.write("".join(items + grids)))["cells"]["count"], 2 * len(mesh.cells))
+
     def test_functions_and_steps_of_one_mesh(self):
         """dolfinx writes each function as a collection of its own, whose steps include one mesh; other programs repeat it, or a step."""
         mesh = Mesh(2)

@@ -182,11 +182,11 @@ bool FunctionPanel::drawCurve(EditedFunction& function, std::span<const double> 
     const OpacityPoint& point = function.points()[*shown];
     const std::string opacity =
         fmt::format("{:.6g}: opacity {:.4g}", function.scalarAt(point.x), point.opacity);
-    const std::string above =
-        fmt::format("{:.3g} % of the volume above", 100 * shareAbove(histogram_, point.x));
-    ImGui::SetTooltip("%s\n%s\nright click to remove\nShift + drag moves all", opacity.c_str(),
-                      above.c_str());
-    nameWithoutTab("point: " + opacity + "; " + above);
+    const std::string above = histogram_.empty() ? ""  // it is being computed
+                                                 : fmt::format("\n{:.3g} % of the volume above",
+                                                               100 * shareAbove(histogram_, point.x));
+    ImGui::SetTooltip("%s%s\nright click to remove\nShift + drag moves all", opacity.c_str(), above.c_str());
+    nameWithoutTab("point: " + opacity);
   } else if (over) {
     const double x = static_cast<double>(canvas.xOf(mouse));
     const auto bin = static_cast<size_t>(x * static_cast<double>(histogram_.size()));

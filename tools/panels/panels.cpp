@@ -417,7 +417,7 @@ void Panels::drawSavedViews(PanelActions& actions, const std::vector<std::string
     const float remove = ImGui::CalcTextSize("Remove").x + 2 * ImGui::GetStyle().FramePadding.x;
     const float width = ImGui::GetContentRegionAvail().x - remove - ImGui::GetStyle().ItemSpacing.x;
     ImGui::PushStyleVar(ImGuiStyleVar_ButtonTextAlign, {0, 0.5f});
-    if (ImGui::Button(view.c_str(), {width, 0})) actions.load_view = view;
+    if (ImGui::Button((view + "##show").c_str(), {width, 0})) actions.load_view = view;
     ImGui::PopStyleVar();
     nameWidget("view " + view);
     hint("show it again: camera, colours, objects and all else of the picture");
