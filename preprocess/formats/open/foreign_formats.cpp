@@ -306,12 +306,11 @@ constexpr Magic kFirstWords[] = {
 bool isGaussianCube(std::string_view begin) {
   if (begin.find_first_not_of(" \t\r\n+-.0123456789e") > begin.find_first_of("0123456789"))
     return false;  // PLOT3D
-  for (int line = 0, lines = 7; line < lines; ++line) {
+  for (int line = 0; line < 7; ++line) {
     const size_t end = std::min(begin.find('\n'), begin.size());
     const std::vector<std::string_view> words = wordsOf(begin.substr(0, end));
     begin.remove_prefix(std::min(end + 1, begin.size()));
     if (line < 2) continue;
-    if (line == 2 && words.size() > 0 && words[0] == "0") lines = 6;  // values follow: there are no atoms
     if (words.size() < (line < 6 ? 4 : 5) || words.size() > 5) return false;
     const std::string_view count = words[0].substr(words[0].starts_with('-'));
     if (!countIn(count) || words[1].find_first_not_of("+-.0123456789e") != std::string_view::npos)
