@@ -28,12 +28,11 @@ void limitHeaps(int most) {
   os::limitHeaps(most);
 }
 
-void requireSpareMemory() {
-  constexpr size_t kSpareBytes = size_t{32} << 20;
-  void* const memory = ::mmap(nullptr, kSpareBytes, PROT_READ | PROT_WRITE,
-                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+void requireSpareMemory(size_t bytes) {
+  void* const memory =
+      ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
-  ::munmap(memory, kSpareBytes);
+  ::munmap(memory, bytes);
 }
 
 }  // namespace curvisplat

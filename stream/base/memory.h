@@ -64,10 +64,11 @@ void freeMemory(Vector& values) {
   Vector().swap(values);
 }
 
-/// Throws std::bad_alloc unless 32 MiB can be mapped now. Maps and unmaps them, which takes some
+/// Throws std::bad_alloc unless these bytes can be mapped now. Maps and unmaps them, which takes some
 /// microseconds. To be called before threads begin to work: glibc and other libraries allocate a few bytes
 /// when a thread first uses them, and some end the process if they cannot. Under a limit of address space
 /// (ulimit -v), buffers that just fit leave nothing for that.
-void requireSpareMemory();
+inline constexpr size_t kSpareBytes = size_t{32} << 20;
+void requireSpareMemory(size_t bytes = kSpareBytes);
 
 }  // namespace curvisplat

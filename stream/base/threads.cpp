@@ -1,5 +1,7 @@
 #include "stream/base/threads.h"
 
+#include <cerrno>
+#include <system_error>
 #include <utility>
 
 #include "stream/base/error.h"
@@ -9,6 +11,34 @@ namespace curvisplat {
 
 void nameThisThread(const char* name) {
   os::nameThread(name);
+}
+
+int errorOfThreads(unsigned count, size_t spare_bytes) {
+  Mutex mutex;  // guards `ending`
+  bool ending = false;
+  ConditionVariable changed;
+  std::vector<std::thread> threads;
+  int error = 0;
+  try {
+    threads.reserve(count);
+    while (threads.size() < count)
+      threads.emplace_back([&] {
+        MutexLock lock(mutex);
+        while (!ending) changed.wait(lock);
+      });
+    requireSpareMemory(spare_bytes);
+  } catch (const std::system_error& failure) {
+    error = failure.code().value();
+  } catch (const std::bad_alloc&) {
+    error = ENOMEM;
+  }
+  {
+    const MutexLock lock(mutex);
+    ending = true;
+  }
+  changed.notify_all();
+  for (std::thread& thread : threads) thread.join();
+  return error;
 }
 
 WorkerTeam::WorkerTeam(unsigned count, const char* name) {

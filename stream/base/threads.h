@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "stream/base/memory.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {
@@ -26,6 +27,10 @@ inline unsigned threadsOrCores(unsigned threads) {
 
 /// Names the calling thread. `name`: at most 15 characters.
 void nameThisThread(const char* name);
+
+/// Starts `count` threads at once and ends them. Returns 0, or the system's error if they cannot be had, or if `spare_bytes` cannot be
+/// mapped beside them (requireSpareMemory()). For libraries and pictures that would end the process, or wait for ever.
+int errorOfThreads(unsigned count, size_t spare_bytes = kSpareBytes);
 
 /// Objects of which each thread has its own, such as scratch memory. Make it a `static` variable of a function:
 /// it lives as long as the process. A `thread_local` object with a destructor would do the same, but glibc ends

@@ -3,43 +3,21 @@
 #include <dlfcn.h>
 
 #include <string>
-#include <system_error>
-#include <thread>
-#include <vector>
 
 #include "stream/base/error.h"
-#include "stream/base/mutex.h"
 #include "stream/base/os.h"
 #include "stream/base/plugin.h"
+#include "stream/base/threads.h"
 
 namespace curvisplat {
 namespace {
 
-/// Throws Error if this process cannot have the threads that libopenvdb's log4cplus starts while it is loaded: one that cannot be
-/// started there ends the process, or leaves it waiting for ever.
-void requireThreadsOfLibrary() {
-  constexpr size_t kThreads = 8;  // it starts 4
-  Mutex mutex;
-  bool ending = false;
-  ConditionVariable changed;
-  std::vector<std::thread> threads;
-  bool all = true;
-  try {
-    while (threads.size() < kThreads)
-      threads.emplace_back([&] {
-        MutexLock lock(mutex);
-        while (!ending) changed.wait(lock);
-      });
-  } catch (const std::system_error&) {
-    all = false;
-  }
-  {
-    const MutexLock lock(mutex);
-    ending = true;
-  }
-  changed.notify_all();
-  for (std::thread& thread : threads) thread.join();
-  if (!all)
+/// Throws Error if this process cannot have the threads and the memory that libopenvdb's log4cplus takes while it is loaded: where one
+/// is missing, it ends the process, or leaves it waiting for ever.
+void requireRoomForLibrary() {
+  constexpr unsigned kThreads = 8;             // it starts 4
+  constexpr size_t kBytes = size_t{96} << 20;  // with all that it links it maps 56 MiB
+  if (errorOfThreads(kThreads, kBytes) != 0)
     throw Error(
         "cannot start a thread: the system has none left; raise the limits of processes and memory (ulimit "
         "-u, ulimit -v)");
@@ -56,7 +34,7 @@ int ownSymbolsFirst() {
 }
 
 const VdbFunctions& loadFunctions() {
-  requireThreadsOfLibrary();
+  requireRoomForLibrary();
   constexpr const char* kName = "curvisplat-vdb.so";
   std::string why_not;
   void* const module = openPlugin(kName, RTLD_NOW | RTLD_LOCAL | ownSymbolsFirst(), why_not);

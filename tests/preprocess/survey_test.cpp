@@ -1,10 +1,15 @@
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <glm/vec3.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <exception>
+#include <future>
 #include <map>
+#include <new>
 #include <random>
 #include <tuple>
 #include <vector>
@@ -15,6 +20,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/survey/grid_statistics.h"
 #include "preprocess/survey/grid_survey.h"
+#include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "tests/reference/function_grid.h"
 #include "tests/support/memory_limit.h"
@@ -260,6 +266,25 @@ TEST(CountingGrid, IsDestroyedWhereMemoryHasEnded) {
     std::_Exit(0);
   };
   EXPECT_EXIT(destroys(), testing::ExitedWithCode(0), "");
+}
+
+/// The library is loaded in other processes, as ctest runs this suite alone.
+TEST(VdbLibrary, IsRefusedWhereItFindsNoMemory) {
+  if (kIsSanitized) GTEST_SKIP() << "sanitizers need the address space themselves";
+  for (uint64_t quarters = 4 * 64; quarters < 4 * 144; ++quarters) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const test::MemoryLimit limit(quarters << 18);
+      try {
+        std::async(std::launch::async, [] { makeCountingGrid(1, 16 << 20); }).get();
+      } catch (const std::exception&) {
+      }
+      ::_exit(0);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status)) << quarters / 4.0 << " MiB: signal " << WTERMSIG(status);
+  }
 }
 
 TEST(CountingGrid, SaturatesInsteadOfOverflowing) {

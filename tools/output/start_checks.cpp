@@ -7,17 +7,13 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <new>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <vector>
 
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/memory.h"
-#include "stream/base/mutex.h"
 #include "stream/base/threads.h"
 
 namespace curvisplat {
@@ -84,31 +80,8 @@ constexpr const char* kAdvice = "raise the limits of processes and memory (ulimi
 
 void tryThreads(unsigned count, const std::string& hint) {
   count = std::min(threadsOrCores(count), kMaxTried) + kOwnThreads;
-  Mutex mutex;  // guards `ending`
-  bool ending = false;
-  ConditionVariable changed;
-  std::vector<std::thread> threads;
-  threads.reserve(count);
-  int error = 0;
-  try {
-    while (threads.size() < count)
-      threads.emplace_back([&] {
-        MutexLock lock(mutex);
-        while (!ending) changed.wait(lock);
-      });
-    requireSpareMemory();
-  } catch (const std::system_error& failure) {
-    error = failure.code().value();
-  } catch (const std::bad_alloc&) {
-    error = ENOMEM;
-  }
-  {
-    const MutexLock lock(mutex);
-    ending = true;
-  }
-  changed.notify_all();
-  for (std::thread& thread : threads) thread.join();
-  if (error != 0) throw Error("cannot start {} threads: {}; {}", count, std::strerror(error), hint);
+  if (const int error = errorOfThreads(count); error != 0)
+    throw Error("cannot start {} threads: {}; {}", count, std::strerror(error), hint);
 }
 
 }  // namespace
