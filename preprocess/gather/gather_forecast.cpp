@@ -15,8 +15,8 @@ namespace {
 constexpr uint64_t kMaxFollowed = uint64_t{1} << 19;
 constexpr uint64_t kCornersOfQuad = 4;
 
-/// The most CellSides of quads with so many corners: a larger face and two smaller ones have eight, as a larger face
-/// and four smaller ones do.
+/// Returns an upper bound of the CellSides of quads that have `corners` corners together. There are most where a large face meets two
+/// small ones: these three quads have eight.
 uint64_t sidesOf(uint64_t corners) {
   return 8 * corners / (3 * kCornersOfQuad);
 }

@@ -9,8 +9,6 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
-#include <glm/vector_relational.hpp>
-#include <limits>
 #include <optional>
 #include <queue>
 #include <set>
@@ -19,8 +17,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/joined_axes.h"
-#include "stream/base/error.h"
-#include "stream/base/progress.h"
+#include "preprocess/survey/stairs.h"
 
 namespace curvisplat {
 namespace {
@@ -38,8 +35,7 @@ constexpr uint64_t kSmallGrid = 100'000;  // nodes
 // blocks that deviate by more are halved along all axes.
 constexpr double kMaxDeviationOfTiny = 0.3;
 constexpr uint64_t kTinyGrid = 10'000;  // nodes
-// The share of a small grid's block whose nodes lie at the edges of stairs, as an ocean's floor has them: splats reach around
-// these. Blocks that have more are halved along all axes as well.
+// Blocks of small grids of which a larger share lies at stairs (stairs.h) are halved along all axes as well.
 constexpr double kMaxStairs = 0.02;
 constexpr uint64_t kLargeGrid = 1'000'000;
 // A large grid's survey takes a few percent of a conversion.
@@ -140,95 +136,6 @@ class SecondDifferences {
   std::array<size_t, 3> strides_;
   std::array<uint64_t, 3> counts_;
 };
-
-/// Whether the cells around a node, by its number in bits along i, j, k, end at no plane: some are missing, and the others are not
-/// those on one side of it.
-bool isAtStairs(unsigned cells) {
-  for (const unsigned side : {0xffu, 0xaau, 0xccu, 0xf0u, 0x55u, 0x33u, 0x0fu, 0u})
-    if (cells == side) return false;
-  return true;
-}
-
-/// How many of a block's inner nodes lie at stairs of blanked ones.
-struct Stairs {
-  uint64_t nodes = 0, at_stairs = 0;
-  glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-lower};  // the box of these nodes
-
-  void add(const NodeArrays& nodes_around, const std::array<size_t, 3>& strides, size_t at) {
-    if (nodes_around.blank[at] != 0) return;
-    ++nodes;
-    const glm::dvec3 place(nodes_around.x[at], nodes_around.y[at], nodes_around.z[at]);
-    lower = glm::min(lower, place);
-    upper = glm::max(upper, place);
-    unsigned there = 0;
-    for (unsigned cell = 0; cell < 8; ++cell) {
-      bool whole = true;
-      for (unsigned corner = 0; corner < 8; ++corner) {
-        size_t node = at;
-        for (unsigned axis = 0; axis < 3; ++axis)
-          if ((corner >> axis & 1) != 0) node += (cell >> axis & 1) != 0 ? strides[axis] : 0 - strides[axis];
-        whole = whole && nodes_around.blank[node] == 0;
-      }
-      there |= whole ? 1u << cell : 0;
-    }
-    if (isAtStairs(there)) ++at_stairs;
-  }
-  double share() const { return nodes > 0 ? static_cast<double>(at_stairs) / static_cast<double>(nodes) : 0; }
-  /// Whether the boxes meet. Those of blocks that only touch do not, as these nodes lie within the blocks.
-  bool meets(const Stairs& other) const {
-    return glm::all(glm::lessThanEqual(glm::max(lower, other.lower), glm::min(upper, other.upper)));
-  }
-};
-
-/// Leaves out the stairs of blocks beside others that may be drawn where nodes are blanked: the coarser cells below finer ones, holes
-/// that are cut around bodies.
-void leaveOutCovered(std::vector<Stairs>& of_blocks) {
-  std::vector<Stairs*> covered;
-  for (Stairs& one : of_blocks)
-    if (one.share() > kMaxStairs && std::ranges::any_of(of_blocks, [&](const Stairs& other) {
-          return &other != &one && one.meets(other);
-        }))
-      covered.push_back(&one);
-  for (Stairs* one : covered) one->at_stairs = 0;
-}
-
-/// The stairs of each block. Nodes are blanked by the grid, and where none of the scalars has a value. Scalars of
-/// cells do not count, and of others the first kMaxScalars, whose values are in memory.
-std::vector<Stairs> stairsOf(const GridSource& source, std::vector<uint32_t> scalars,
-                             std::optional<double> blank_value) {
-  const GridDescription& description = source.description();
-  constexpr size_t kMaxScalars = 16;
-  std::erase_if(scalars, [&](uint32_t n) { return description.scalars.at(n).centring != Centring::kNode; });
-  scalars.resize(std::min(scalars.size(), kMaxScalars));
-  const NodeReader reader = NodeReader::ofAnyValue(source, scalars, blank_value);
-  SlabStream stream(reader, kWindowNodes * slabBytesPerNode(scalars.size()),
-                    cutIntoSlabs(description.blocks, kWindowNodes, kNodeHalo));
-  std::vector<Stairs> of_blocks(description.blocks.size());
-  while (const LoadedSlab* loaded = stream.next()) {
-    const Slab& slab = loaded->slab;
-    const GridBlock& block = description.blocks[slab.block];
-    const WindowStrides strides(slab.window, block.ni);
-    for (uint64_t k = std::max<uint64_t>(slab.box.k0, 1); k < std::min(slab.box.k1, block.nk - 1); ++k)
-      for (uint64_t j = std::max<uint64_t>(slab.box.j0, 1); j < std::min(slab.box.j1, block.nj - 1); ++j)
-        for (uint64_t i = std::max<uint64_t>(slab.box.i0, 1);
-             i < std::min(slab.box.endOfRow(block.ni), block.ni - 1); ++i)
-          of_blocks[slab.block].add(loaded->nodes, {1, strides.row, strides.plane}, strides.at(i, j, k));
-  }
-  leaveOutCovered(of_blocks);
-  return of_blocks;
-}
-
-/// The same, but no stairs where a scalar cannot be read: its conversion says so.
-std::vector<Stairs> stairsIfRead(const GridSource& source, const std::vector<uint32_t>& scalars,
-                                 std::optional<double> blank_value) {
-  try {
-    return stairsOf(source, scalars, blank_value);
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const Error&) {
-    return std::vector<Stairs>(source.description().blocks.size());
-  }
-}
 
 BlockBends sumOf(const GridBlock& block, const LoadedSlab& loaded) {
   const Slab& slab = loaded.slab;
@@ -456,10 +363,10 @@ Refinement refinementByNeed(const GridSource& source, const std::vector<uint32_t
   const double max = small ? kMaxDeviationOfSmall : kMaxDeviation;
   const bool shows =
       std::ranges::any_of(bends, [max](const BlockBends& of_block) { return of_block.deviation() > max; });
-  const std::vector<Stairs> stairs =
-      nodes <= kSmallGrid ? stairsIfRead(source, scalars, blank_value) : std::vector<Stairs>(blocks.size());
+  const std::vector<double> stairs =
+      nodes <= kSmallGrid ? shareAtStairs(source, scalars, blank_value) : std::vector<double>(blocks.size());
   const auto is_halved = [&](uint32_t block) {
-    return (tiny && bends[block].deviation() > kMaxDeviationOfTiny) || stairs[block].share() > kMaxStairs;
+    return (tiny && bends[block].deviation() > kMaxDeviationOfTiny) || stairs[block] > kMaxStairs;
   };
   bool halves = false;
   for (uint32_t block = 0; block < blocks.size(); ++block) halves |= is_halved(block);

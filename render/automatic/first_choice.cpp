@@ -102,7 +102,6 @@ FunctionParts FirstChoice::constantFunction() const {
 }
 
 FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& maps) const {
-  FunctionParts parts;
   const auto with_map = [&](FunctionParts chosen, const char* preferred) {
     chosen.map = map.empty() ? preferred : map;
     return chosen;
@@ -113,18 +112,19 @@ FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& m
 
   const BinExtinctions extinctions = extinctionsOf(*histogram);
   const double zero = histogram->coordinate(0);
-  bool diverging = false;
-  const auto over = [&](double begin, double end) {
+  const auto diverges = [&](double begin, double end) {
     const double below = zero - begin, above = end - zero;
-    diverging = (map.empty() || isDiverging(map)) && below > 0 && above > 0 &&
-                std::min(below, above) > kDivergingShare * std::max(below, above);
+    return (map.empty() || isDiverging(map)) && below > 0 && above > 0 &&
+           std::min(below, above) > kDivergingShare * std::max(below, above);
+  };
+  const auto over = [&](double begin, double end) -> std::optional<FunctionParts> {
+    const bool diverging = diverges(begin, end);
     const double low = histogram->scalar(begin), high = histogram->scalar(end);
     if (diverging) {
-      const double reach = std::max(below, above);
+      const double reach = std::max(zero - begin, end - zero);
       begin = zero - reach;
       end = zero + reach;
     }
-    parts.asinh = histogram->asinh;
     const auto rounded = [&](double coordinate) {
       const double scalar = histogram->scalar(coordinate);
       const double from = histogram->asinh
@@ -132,22 +132,23 @@ FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& m
                               : high - low;
       return roundedTo(scalar, from, kRangeDigits);
     };
+    FunctionParts parts;
+    parts.asinh = histogram->asinh;
     parts.range = {rounded(begin), rounded(end)};
-    if (!(parts.range.first < parts.range.second)) return false;
+    if (!(parts.range.first < parts.range.second)) return std::nullopt;
     parts.opacities = opacityPoints(*histogram, extinctions, histogram->coordinate(parts.range.first),
                                     histogram->coordinate(parts.range.second));
     parts = with_map(parts, diverging ? maps.diverging : maps.sequential);
     parts.opacity_unit = opacityUnitOf(parts.function());
-    return true;
+    return parts;
   };
   const auto [begin, end] = seenInterval(*histogram, extinctions);
-  if (!over(begin, end)) return with_map(constantFunction(), maps.sequential);
-  const FunctionParts whole = parts;
+  const std::optional<FunctionParts> whole = over(begin, end);
+  if (!whole) return with_map(constantFunction(), maps.sequential);
   const auto narrower = narrowedInterval(
-      *histogram, seenIn(*histogram, parts.function()), histogram->coordinate(parts.range.first),
-      histogram->coordinate(parts.range.second), diverging ? std::optional(zero) : std::nullopt);
-  if (narrower && !over(narrower->first, narrower->second)) return whole;
-  return parts;
+      *histogram, seenIn(*histogram, whole->function()), histogram->coordinate(whole->range.first),
+      histogram->coordinate(whole->range.second), diverges(begin, end) ? std::optional(zero) : std::nullopt);
+  return narrower ? over(narrower->first, narrower->second).value_or(*whole) : *whole;
 }
 
 BinWeights FirstChoice::seenIn(const VolumeHistogram& histogram, const TransferFunction& function) const {

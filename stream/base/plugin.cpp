@@ -39,13 +39,13 @@ void* openPlugin(const char* name, int flags, std::string& why_not) {
 }
 
 const char* pluginAdvice(std::string_view why_not) {
-  // The dynamic linker's and the system's words for a file that finds no room; not those for one that needs a thread's storage from the
-  // start, or that lies where nothing may be executed.
-  for (const char* words : {"static TLS", "not permitted"})
-    if (why_not.find(words) != std::string_view::npos) return "install curvisplat again";
-  for (const char* words : {"failed to map", "cannot map", "annot allocate"})
-    if (why_not.find(words) != std::string_view::npos) return "raise the limit of memory (ulimit -v)";
-  return "install curvisplat again";
+  const auto says = [&](std::string_view words) { return why_not.find(words) != std::string_view::npos; };
+  // The words of the dynamic linker and of the system. A file may also need a thread's storage from the start, or lie where nothing may
+  // be executed.
+  const bool finds_no_room = says("failed to map") || says("cannot map") || says("annot allocate");
+  return finds_no_room && !says("static TLS") && !says("not permitted")
+             ? "raise the limit of memory (ulimit -v)"
+             : "install curvisplat again";
 }
 
 fs::path bundledFile(const char* name) {

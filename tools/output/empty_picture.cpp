@@ -213,13 +213,13 @@ std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
     return fmt::format("the picture is {}; try --opacity auto --opacity-unit {:.2g} or --view iso", what,
                        scene.transfer_function.opacityUnit() / 10);
   const auto& globe = scene.manifest.globe;
-  const bool thin = globe && globe->vertical_scale == 1 && scene.options.scale.z == 1;
-  const std::string stretched =
-      fmt::format("if layers above one another are seen as one, {}--vertical-scale 50; or ",
-                  thin && globe->sphere() ? "convert with " : "");
+  std::string stretched;
+  if (globe && globe->vertical_scale == 1 && scene.options.scale.z == 1)
+    stretched = fmt::format("if layers above one another are seen as one, {}--vertical-scale 50; or ",
+                            globe->sphere() ? "convert with " : "");
   return fmt::format(
       "the picture is {}; {}try --range 1%,99%, or --clip-box if the outermost layer hides the rest", what,
-      thin ? stretched : "");
+      stretched);
 }
 
 std::string rangeMissesScalar(const VariableInfo& variable, const TransferFunction& transfer_function) {

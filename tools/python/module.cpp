@@ -182,12 +182,17 @@ std::string refinementOf(const py::dict& given_options) {
   return text;
 }
 
+std::vector<uint32_t> allScalars(size_t count) {
+  std::vector<uint32_t> all(count);
+  std::iota(all.begin(), all.end(), 0u);
+  return all;
+}
+
 /// The source with cells cut as "refine" asks. Reads it without the interpreter's lock, which a source of Python's needs; but it is
 /// deleted with it.
 std::unique_ptr<DataSource> refinedAs(const py::dict& given_options, std::unique_ptr<DataSource> source,
                                       std::optional<double> blank_value, const py::object& progress) {
-  std::vector<uint32_t> all(source->description().scalars.size());
-  std::iota(all.begin(), all.end(), 0u);
+  const std::vector<uint32_t> all = allScalars(source->description().scalars.size());
   const auto threads = py::cast<unsigned>(given_options["threads"]);
   const auto parts = parseRefinement("refine", refinementOf(given_options));
   Refinement refinement(parts.value_or(1));
@@ -252,12 +257,6 @@ py::dict convertSource(const DataSource& source, ConvertOptions options, const p
   return reportOf(report, notesOn(source.description(), refinementOf(given_options) == "auto"));
 }
 
-std::vector<uint32_t> allScalars(const ScalarNames& names) {
-  std::vector<uint32_t> all;
-  for (uint32_t n = 0; n < names.size(); ++n) all.push_back(n);
-  return all;
-}
-
 std::unique_ptr<GridSource> sourceOf(const py::list& blocks, const ScalarNames& names,
                                      const py::dict& given_options) {
   std::vector<BlockArrays> arrays;
@@ -274,7 +273,7 @@ std::unique_ptr<GridSource> sourceOf(const py::list& blocks, const ScalarNames& 
 py::dict convertArrays(const std::filesystem::path& output, const py::list& blocks, const ScalarNames& names,
                        const py::dict& given_options, const py::object& progress) {
   ConvertOptions options = convertOptions(output, given_options);
-  options.scalars = allScalars(names);
+  options.scalars = allScalars(names.size());
   beginThreads(options.threads);
   const auto source =
       refinedAs(given_options, sourceOf(blocks, names, given_options), options.blank_value, progress);
@@ -296,7 +295,7 @@ uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks
   input.count = 1;
   input.name = [](uint64_t) { return std::string("arrays in memory"); };
   input.open = [&](uint64_t) { return std::move(source); };
-  input.scalars = [&](const GridDescription&) { return allScalars(names); };
+  input.scalars = [&](const GridDescription&) { return allScalars(names.size()); };
   SeriesReport report;
   beginThreads(options.convert.threads);
   runInterruptibly(progress, [&](Progress& of_work) {
@@ -309,7 +308,7 @@ py::dict convertCallable(const std::filesystem::path& output,
                          const std::vector<std::array<uint64_t, 3>>& shapes, const ScalarNames& names,
                          const py::object& read, const py::dict& given_options, const py::object& progress) {
   ConvertOptions options = convertOptions(output, given_options);
-  options.scalars = allScalars(names);
+  options.scalars = allScalars(names.size());
   const bool parts = py::cast<bool>(given_options["parts_of_rows"]);
   beginThreads(options.threads);
   const auto source =

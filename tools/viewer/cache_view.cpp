@@ -373,7 +373,7 @@ PanelActions CacheView::drawPanels(const WindowLayout& layout) {
 }
 
 void CacheView::apply(const PanelActions& actions) {
-  if (actions.time) goToStep([&](Playback& playback) { playback.goTo(*actions.time); });
+  if (actions.time) goToStep([&](Playback& playback) { return playback.goTo(*actions.time); });
   if (actions.interpolates) changed_ |= playback_.setInterpolates(*actions.interpolates);
   dragging_ = actions.dragging;
   changed_ |= actions.changed;

@@ -117,7 +117,7 @@ class CacheView {
  private:
   static std::span<const CommandAction<CacheView>> actions();
   void toggle(bool& value);
-  void goToStep(const std::function<void(Playback&)>& move);
+  void goToStep(const std::function<bool(Playback&)>& move);
   void addPlaneTo(std::vector<ListedPlane>& planes);
   void saveMovieOf(MovieKind kind);
   void copyLater(MovieKind what) { copy_requested_ = what; }

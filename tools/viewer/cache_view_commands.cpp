@@ -100,10 +100,12 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
          v.changed_ = true;
        },
        kHasSteps, [](const View& v) { return v.playback_.isPlaying(); }},
-      {Command::kNextStep, [](View& v) { v.goToStep([](Playback& p) { p.advance(true); }); }, kHasSteps},
-      {Command::kPreviousStep, [](View& v) { v.goToStep([](Playback& p) { p.advance(false); }); }, kHasSteps},
-      {Command::kFirstStep, [](View& v) { v.goToStep([](Playback& p) { p.goTo(0); }); }, kHasSteps},
-      {Command::kLastStep, [](View& v) { v.goToStep([](Playback& p) { p.goTo(p.steps() - 1); }); },
+      {Command::kNextStep, [](View& v) { v.goToStep([](Playback& p) { return p.advance(true); }); },
+       kHasSteps},
+      {Command::kPreviousStep, [](View& v) { v.goToStep([](Playback& p) { return p.advance(false); }); },
+       kHasSteps},
+      {Command::kFirstStep, [](View& v) { v.goToStep([](Playback& p) { return p.goTo(0); }); }, kHasSteps},
+      {Command::kLastStep, [](View& v) { v.goToStep([](Playback& p) { return p.goTo(p.steps() - 1); }); },
        kHasSteps},
   };
   return kActions;
@@ -130,10 +132,10 @@ void CacheView::toggle(bool& value) {
 }
 
 /// Goes to a step that the user chose. It is to be looked at: playing ends.
-void CacheView::goToStep(const std::function<void(Playback&)>& move) {
+void CacheView::goToStep(const std::function<bool(Playback&)>& move) {
+  changed_ |= playback_.isPlaying();
   playback_.stop();
-  move(playback_);
-  changed_ = true;
+  changed_ |= move(playback_);
 }
 
 void CacheView::addPlaneTo(std::vector<ListedPlane>& planes) {

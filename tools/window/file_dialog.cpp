@@ -298,16 +298,13 @@ void FileDialog::drawRate() {
     movie_.chosen_frames = static_cast<uint64_t>(std::clamp(chosen, 1, kMaxFrames));
     ImGui::SameLine();
   }
-  const uint64_t frames = framesOfMovie();
+  const uint64_t frames =
+      movie_.chosen_frames > 0 ? movie_.chosen_frames : movie_.frames(movie_.frames_per_s);
   const double seconds = static_cast<double>(frames) / movie_.frames_per_s;
   const std::string pictures = countText(frames, "picture");
   ImGui::TextUnformatted(movie_.chosen_frames > 0 ? fmt::format("pictures in all: {:.1f} s", seconds).c_str()
                                                   : fmt::format("{}: {:.1f} s", pictures, seconds).c_str());
   nameWidget(fmt::format("movie of pictures a second: {}, {:.1f} s", pictures, seconds));
-}
-
-uint64_t FileDialog::framesOfMovie() const {
-  return movie_.chosen_frames > 0 ? movie_.chosen_frames : movie_.frames(movie_.frames_per_s);
 }
 
 /// A click takes a name, with Control several; a double click opens.
@@ -412,7 +409,7 @@ std::optional<FileDialog::Chosen> FileDialog::accept() {
     if (*purpose_ == Purpose::kSavePicture || *purpose_ == Purpose::kSaveMovie) chosen.size = size_;
     if (*purpose_ == Purpose::kSaveMovie) {
       chosen.frames_per_s = movie_.frames_per_s;
-      chosen.frames = framesOfMovie();
+      chosen.frames = movie_.chosen_frames;
     }
     return chosen;
   }

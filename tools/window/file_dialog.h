@@ -49,7 +49,7 @@ class FileDialog {
     std::vector<std::filesystem::path> files;
     std::optional<ImageSize> size = std::nullopt;  // of a picture or a movie
     double frames_per_s = 0;                       // of a movie
-    uint64_t frames = 0;                           // of a movie
+    uint64_t frames = 0;                           // of a movie, if they were chosen; else 0
   };
   /// Size and rate of a movie, which can be changed.
   struct MovieOffer {
@@ -94,7 +94,6 @@ class FileDialog {
   std::optional<Chosen> accept();
   void drawSize();
   void drawRate();
-  uint64_t framesOfMovie() const;
 
   const IsGridFolder is_grid_folder_;
   std::vector<std::string> data_endings_;  // of kOpenData
