@@ -31,9 +31,7 @@ class SeriesConversion {
         progress_(progress),
         report_event_(report),
         ranks_(*options.convert.ranks) {
-    const std::filesystem::path& output = options.convert.output;
-    const bool is_cache = std::filesystem::exists(output / "manifest.json") && !hasUnfinished(output);
-    if (options.add || (options.convert.resume && is_cache)) openCache();
+    if (hasCache()) openCache();
     if (!options.add) known_ = times_.size();
   }
 
@@ -175,8 +173,21 @@ class SeriesConversion {
     return {steps - 1, expect_new_geometry_, next, in_group};
   }
 
+  /// Whether there is a cache to go on with. Rank 0 looks, and clears what a killed conversion has left, before the others read it.
+  bool hasCache() {
+    const std::filesystem::path& output = options_.convert.output;
+    std::vector<uint8_t> has(1);
+    if (ranks_.isFirst()) {
+      const auto is_cache = [&] {
+        return std::filesystem::exists(output / "manifest.json") && !hasUnfinished(output);
+      };
+      has[0] = options_.add || (options_.convert.resume && is_cache());
+      if (has[0] != 0) ConversionWorkspace::clearKilled(output);
+    }
+    return fromBytes<uint8_t>(ranks_.broadcast(toBytes(has)))[0] != 0;
+  }
+
   void openCache() {
-    if (ranks_.isFirst()) ConversionWorkspace::clearKilled(options_.convert.output);
     const CacheReader cache(options_.convert.output);
     for (const SeriesStep& step : cache.series().steps) times_.push_back(step.time);
     for (const BlockInfo& block : cache.seriesManifest().blocks) names_.push_back(block.name);
@@ -189,11 +200,13 @@ class SeriesConversion {
                            cache.series().first_steps.back() == cache.series().steps.size() - 1;
   }
 
-  /// How many of the steps to add, from the first on, an interrupted addition of the same steps has added.
+  /// How many of the steps to add, from the first on, an interrupted addition of the same steps has added. As rank 0 sees it.
   uint64_t stepsAddedBefore() {
     if (!options_.add) return 0;
     uint64_t number = 0;
-    while (options_.convert.resume && number < input_.count && isInCache(number)) ++number;
+    if (ranks_.isFirst() && options_.convert.resume)
+      while (number < input_.count && isInCache(number)) ++number;
+    number = fromBytes<uint64_t>(ranks_.broadcast(toBytes(std::vector{number})))[0];
     first_number_ = times_.size() - number;
     return number;
   }

@@ -158,9 +158,21 @@ class Conversion {
     return std::move(report_);
   }
 
+  /// Where rank 0 alone surveys, the others throw DifferingBlanks as it does: all go on with it.
+  void survey() {
+    try {
+      if (makesSplats()) splats_.survey = origin_->survey(progress_);
+    } catch (const DifferingBlanks& differing) {
+      if (origin_->isShared()) throw;
+      splats_.survey.blanked.lost = differing.lost();
+    }
+    if (origin_->isShared()) return;
+    splats_.survey = broadcastSurvey(splats_.survey, ranks_);
+    checkExtent(splats_.survey, origin_->description());
+  }
+
   void scan() {
-    if (makesSplats()) splats_.survey = origin_->survey(progress_);
-    if (!origin_->isShared()) splats_.survey = broadcastSurvey(splats_.survey, ranks_);
+    survey();
     const auto& lost = splats_.survey.blanked.lost;
     if (options_.differing != DifferingScalars::kBlankAll && !lost.empty()) throw DifferingBlanks(lost, true);
     checkRanges(splats_.survey, origin_->description(), options_.scalars);

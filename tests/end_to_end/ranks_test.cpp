@@ -25,16 +25,20 @@ class RanksCommand : public ProgramSuite<RanksCommand> {
   static Words renderTo(const std::string& name, const Words& more = {}) {
     return Words{"render", file("g.splats"), "-o", file(name), "--size", "150x100", "--threads", "1"} + more;
   }
-  /// A script that draws never.png: the given rank from a cache of its own, the others from `cache`.
-  static std::string renderScript(unsigned rank, const std::string& its_cache, const std::string& cache) {
-    const std::string script = file(fmt::format("as_rank_{}.sh", rank));
-    writeFileAtomically(script, fmt::format("#!/bin/sh\n"
-                                            "cache=\"{}\"\n"
-                                            "[ \"$OMPI_COMM_WORLD_RANK\" = {} ] && cache=\"{}\"\n"
-                                            "exec \"{}\" render \"$cache\" -o \"{}\"\n",
-                                            cache, rank, its_cache, CURVISPLAT_PROGRAM, file("never.png")));
+  /// A script of bash that runs the program in the tests' folder; the given rank does something else before.
+  static std::string atRank(unsigned rank, const std::string& before, const std::string& words) {
+    const std::string script = file("as_ranks.sh");
+    writeFileAtomically(script, fmt::format("#!/bin/bash\ncd \"{}\"\n"
+                                            "[ \"$OMPI_COMM_WORLD_RANK\" = {} ] && {}\n"
+                                            "exec \"{}\" {}\n",
+                                            file(""), rank, before, CURVISPLAT_PROGRAM, words));
     fs::permissions(script, fs::perms::owner_all);
     return script;
+  }
+  /// Expects that the folder has no file whose name begins so.
+  static void expectNone(const std::string& begin) {
+    for (const auto& entry : fs::directory_iterator(file("")))
+      EXPECT_FALSE(entry.path().filename().string().starts_with(begin)) << entry.path();
   }
   static void expectSameFile(const std::string& a, const std::string& b) {
     EXPECT_TRUE(readTextFile(file(a)) == readTextFile(file(b))) << a << " and " << b;
@@ -104,15 +108,9 @@ TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
                            "s_0002.nam", "s_0003.fun", "s_0003.nam"})
     fs::copy_file(file(name), file("other/") + name);
   fs::resize_file(file("other/s_0003.fun"), 100);
-  const std::string script = file("one_old.sh");
-  writeFileAtomically(
-      script,
-      fmt::format("#!/bin/sh\n"
-                  "cd \"{}\"\n"
-                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && cd other\n"
-                  "exec \"{}\" convert s.xyz s_%04d.fun --threads 1 --refine 1 --overwrite -o \"{}\"\n",
-                  file(""), CURVISPLAT_PROGRAM, file("s.splats")));
-  fs::permissions(script, fs::perms::owner_all);
+  const std::string script =
+      atRank(1, "cd other",
+             "convert s.xyz s_%04d.fun --threads 1 --refine 1 --overwrite -o \"" + file("s.splats") + '"');
   const ProgramResult result = runAsRanks(3, {}, script);
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
@@ -125,6 +123,76 @@ TEST_F(RanksCommand, TheFirstConvertsAStepThatAnotherCannotReadAndSaysSo) {
     }
 }
 
+TEST_F(RanksCommand, AddStepsWhereOneCannotReadAStepThatIsThere) {
+  run({"generate", "wake", "--size", "20x16x12", "--steps", "4", "-o", file("a")});
+  const std::string cache = '"' + file("a.splats") + '"';
+  const auto convert = [&](const std::string& words, unsigned ranks, const std::string& of_second = "true") {
+    return runAsRanks(ranks, {},
+                      atRank(1, of_second, "convert a.xyz 'a_*.fun' --threads 1 --steps " + words));
+  };
+  ASSERT_EQ(convert("0:1 --refine 1 -o " + cache, 1).status, 0);
+  ASSERT_EQ(convert("2:3 --add-steps --to " + cache, 1).status, 0);
+  const Files expected = filesOf(file("a.splats"));
+  fs::create_directory(file("unread"));
+  for (const auto& entry : fs::directory_iterator(file("")))
+    if (entry.path().filename().string().starts_with("a") && entry.is_regular_file())
+      fs::copy_file(entry.path(), file("unread/") + entry.path().filename().string());
+  fs::resize_file(file("unread/a_0002.fun"), 100);
+  const ProgramResult result = convert("2:3 --add-steps --resume --to " + cache, 2, "cd unread");
+  EXPECT_EQ(result.status, 0) << result.err;
+  expectSays(result.out, "4 steps, 0 of them converted now");
+  EXPECT_TRUE(filesOf(file("a.splats")) == expected);
+}
+
+TEST_F(RanksCommand, ThatSeeOtherNumbersOfStepsAreRefused) {
+  run({"generate", "wake", "--size", "20x16x12", "--steps", "3", "-o", file("n")});
+  for (const int fewer : {2, 1}) {  // one is no series
+    const fs::path folder = file(fmt::format("fewer{}", fewer));
+    fs::create_directory(folder);
+    fs::copy_file(file("n.xyz"), folder / "n.xyz");
+    for (int step = 0; step < fewer; ++step)
+      for (const char* ending : {"fun", "nam"})
+        fs::copy_file(file(fmt::format("n_000{}.{}", step, ending)),
+                      folder / fmt::format("n_000{}.{}", step, ending));
+    const std::string script =
+        atRank(1, "cd " + folder.filename().string(),
+               "convert n.xyz 'n_*.fun' --threads 1 -o \"" + file("mixed.splats") + '"');
+    expectRefused(
+        runAsRanks(2, {}, script), 1,
+        {"rank 1 of 2", fmt::format("{} here and 3 time steps at rank 0; give all ranks the same files",
+                                    fewer == 1 ? "1 time step" : "2 time steps")});
+    expectNone("mixed");
+  }
+}
+
+TEST_F(RanksCommand, ConvertScalarsOfAMeshThatShareNoSample) {
+  constexpr int kCells = 12;
+  std::string text = fmt::format(
+      "# vtk DataFile Version 3.0\nm\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} float\n", 4 * (kCells + 1));
+  for (int x = 0; x <= kCells; ++x) text += fmt::format("{0} 0 0 {0} 1 0 {0} 1 1 {0} 0 1\n", x);
+  text += fmt::format("CELLS {} {}\n", kCells, 9 * kCells);
+  for (int n = 0; n < kCells; ++n) {
+    text += "8";
+    for (int corner = 0; corner < 8; ++corner) text += fmt::format(" {}", 4 * n + corner);
+    text += "\n";
+  }
+  text += fmt::format("CELL_TYPES {}\n", kCells);
+  for (int n = 0; n < kCells; ++n) text += "12\n";
+  text += fmt::format("CELL_DATA {}\n", kCells);
+  for (const int remainder : {0, 1}) {
+    text += fmt::format("SCALARS s{} float 1\nLOOKUP_TABLE default\n", remainder);
+    for (int n = 0; n < kCells; ++n) text += n % 2 == remainder ? fmt::format("{}\n", n) : "nan\n";
+  }
+  writeFileAtomically(file("m.vtk"), text);
+  const auto to = [](const std::string& name) {
+    return Words{"convert", file("m.vtk"), "--threads", "1", "-o", file(name)};
+  };
+  run(to("m1.splats"));
+  const ProgramResult shared = runAsRanks(3, to("m3.splats"));
+  EXPECT_EQ(shared.status, 0) << shared.err;
+  EXPECT_TRUE(filesOf(file("m3.splats")) == filesOf(file("m1.splats")));
+}
+
 TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
   fs::create_directory(file("elsewhere"));
   run({"generate", "half-annulus", "--size", "60x32x32", "-o", file("elsewhere/g")});
@@ -134,33 +202,19 @@ TEST_F(RanksCommand, ThatSeeOtherFilesAreRefused) {
             0);
   for (const std::string command : {"convert g.xyz g.fun --threads 1 -o ", "render g.splats -o "}) {
     const std::string output = file(command.front() == 'c' ? "mixed.splats" : "mixed.png");
-    const std::string script = file("one_elsewhere.sh");
-    writeFileAtomically(script, fmt::format("#!/bin/sh\n"
-                                            "cd \"{}\"\n"
-                                            "[ \"$OMPI_COMM_WORLD_RANK\" = 2 ] && cd elsewhere\n"
-                                            "exec \"{}\" {} \"{}\"\n",
-                                            file(""), CURVISPLAT_PROGRAM, command, output));
-    fs::permissions(script, fs::perms::owner_all);
+    const std::string script = atRank(2, "cd elsewhere", fmt::format("{} \"{}\"", command, output));
     expectRefused(runAsRanks(3, {}, script), 1, {"rank 2 of 3", "here than at rank 0"});
-    for (const auto& entry : fs::directory_iterator(file("")))
-      EXPECT_FALSE(entry.path().filename().string().starts_with("mixed")) << entry.path();
+    expectNone("mixed");
   }
 }
 
 TEST_F(RanksCommand, ThatHaveOtherOptionsAreRefused) {
-  const std::string script = file("one_other.sh");
   const auto expectOtherRefused = [&](const std::string& command, const std::string& of_one,
                                       const std::string& told) {
-    writeFileAtomically(script,
-                        fmt::format("#!/bin/sh\ncd \"{}\"\n"
-                                    "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && exec \"{}\" {}\n"
-                                    "exec \"{}\" {}\n",
-                                    file(""), CURVISPLAT_PROGRAM, of_one, CURVISPLAT_PROGRAM, command));
-    fs::permissions(script, fs::perms::owner_all);
+    const std::string script = atRank(1, fmt::format("exec \"{}\" {}", CURVISPLAT_PROGRAM, of_one), command);
     expectRefused(runAsRanks(2, {}, script), 2,
                   {"rank 1 of 2", told + " at rank 0; start all ranks with the same options"});
-    for (const auto& entry : fs::directory_iterator(file("")))
-      EXPECT_FALSE(entry.path().filename().string().starts_with("mixed")) << entry.path();
+    expectNone("mixed");
   };
   const std::string convert = "convert g.xyz g.fun -o mixed.splats";
   expectOtherRefused(convert, convert + " --value-precision fine",
@@ -179,14 +233,14 @@ TEST_F(RanksCommand, ThatHaveOtherOptionsAreRefused) {
 
 TEST_F(RanksCommand, OfSeveralThatFailOfOneCauseTheLowestReports) {
   // All ranks but the first see no cache; rank 0 fails later than they do, as it hears of it.
-  const std::string script = renderScript(0, file("g.splats"), file("missing.splats"));
+  const std::string script = atRank(0, "cache=g.splats", "render \"${cache:-missing.splats}\" -o never.png");
   expectRefused(runAsRanks(4, {}, script), 1, {"rank 1 of 4", "missing.splats"});
   EXPECT_FALSE(fs::exists(file("never.png")));
 }
 
 TEST_F(RanksCommand, AreEndedByTheOneThatFails) {
   // Rank 1 sees no cache, as on a machine where the file system is not mounted.
-  const std::string script = renderScript(1, file("missing.splats"), file("g.splats"));
+  const std::string script = atRank(1, "cache=missing.splats", "render \"${cache:-g.splats}\" -o never.png");
   expectRefused(runAsRanks(3, {}, script), 1, {"rank 1 of 3", "missing.splats"});
   EXPECT_FALSE(fs::exists(file("never.png")));
 }
@@ -206,8 +260,7 @@ TEST_F(RanksCommand, ConvertTogether) {
     for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
     EXPECT_EQ(jsonOf(file("c.json"))["ranks"], count);
   }
-  for (const auto& entry : fs::directory_iterator(folder_->path()))
-    EXPECT_EQ(entry.path().filename().string().find("shared.splats."), std::string::npos) << entry.path();
+  expectNone("shared.splats.");
 }
 
 TEST_F(RanksCommand, CutCellsByNeedAlike) {
@@ -304,8 +357,7 @@ TEST_F(RanksCommand, AddScalarsTogether) {
   }
   expectRefused(runAsRanks(2, adding("added.splats")), 2, {"already has a scalar"});
   EXPECT_TRUE(filesOf(file("added.splats")) == expected);
-  for (const auto& entry : fs::directory_iterator(folder_->path()))
-    EXPECT_EQ(entry.path().filename().string().find("added.splats."), std::string::npos) << entry.path();
+  expectNone("added.splats.");
 }
 
 TEST_F(RanksCommand, LeaveTheCacheWhereOneFailsInAnAddition) {
@@ -313,48 +365,26 @@ TEST_F(RanksCommand, LeaveTheCacheWhereOneFailsInAnAddition) {
   const Files before = filesOf(file("kept.splats"));
   // Rank 1 has no grid, or a full disk.
   for (const char* const fault : {"grid=missing.xyz", "ulimit -f 100"}) {
-    const std::string script = file("one_fails.sh");
-    writeFileAtomically(
-        script, fmt::format("#!/bin/bash\n"
-                            "grid=\"{}\"\n"
-                            "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && {}\n"
-                            "exec \"{}\" convert \"$grid\" \"{}\" --add-scalar volume --to \"{}\"\n",
-                            file("g.xyz"), fault, CURVISPLAT_PROGRAM, file("g.fun"), file("kept.splats")));
-    fs::permissions(script, fs::perms::owner_all);
+    const std::string script =
+        atRank(1, fault, "convert ${grid:-g.xyz} g.fun --add-scalar volume --to kept.splats");
     SCOPED_TRACE(fault);
     expectRefused(runAsRanks(3, {}, script), 1, {"rank 1 of 3"});
     EXPECT_TRUE(filesOf(file("kept.splats")) == before);
-    for (const auto& entry : fs::directory_iterator(folder_->path()))
-      EXPECT_EQ(entry.path().filename().string().find("kept.splats."), std::string::npos) << entry.path();
+    expectNone("kept.splats.");
   }
 }
 
 TEST_F(RanksCommand, LeaveNothingWhereOneFailsInAConversion) {
   // Rank 1 has no grid.
-  const std::string script = file("one_without.sh");
-  writeFileAtomically(script,
-                      fmt::format("#!/bin/sh\n"
-                                  "grid=\"{0}\"\n"
-                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && grid=\"{0}.missing\"\n"
-                                  "exec \"{2}\" convert \"$grid\" \"{1}\" -o \"{3}\"\n",
-                                  file("g.xyz"), file("g.fun"), CURVISPLAT_PROGRAM, file("never.splats")));
-  fs::permissions(script, fs::perms::owner_all);
+  const std::string script = atRank(1, "grid=missing.xyz", "convert ${grid:-g.xyz} g.fun -o never.splats");
   expectRefused(runAsRanks(2, {}, script), 1, {"rank 1 of 2"});
-  for (const auto& entry : fs::directory_iterator(folder_->path()))
-    EXPECT_EQ(entry.path().filename().string().find("never"), std::string::npos) << entry.path();
+  expectNone("never");
 }
 
 TEST_F(RanksCommand, NameTheRankWhoseDiskIsFull) {
-  const std::string script = file("one_full.sh");
-  writeFileAtomically(script,
-                      fmt::format("#!/bin/bash\n"
-                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && ulimit -f 100\n"
-                                  "exec \"{}\" convert \"{}\" \"{}\" -o \"{}\"\n",
-                                  CURVISPLAT_PROGRAM, file("g.xyz"), file("g.fun"), file("never.splats")));
-  fs::permissions(script, fs::perms::owner_all);
+  const std::string script = atRank(1, "ulimit -f 100", "convert g.xyz g.fun -o never.splats");
   expectRefused(runAsRanks(3, {}, script), 1, {"rank 1 of 3", "File too large"});
-  for (const auto& entry : fs::directory_iterator(folder_->path()))
-    EXPECT_EQ(entry.path().filename().string().find("never.splats"), std::string::npos) << entry.path();
+  expectNone("never.splats");
 }
 
 TEST_F(RanksCommand, NameTheRankWhoseCardFails) {
@@ -362,12 +392,7 @@ TEST_F(RanksCommand, NameTheRankWhoseCardFails) {
   if (card.empty()) GTEST_SKIP() << "sanitizers have their own preloaded library";
   const Words words = renderTo("egl.exr", {"--backend", "egl"});
   if (const ProgramResult drawn = runProgram(words); drawn.status != 0) GTEST_SKIP() << drawn.err;
-  const std::string script = file("one_lost.sh");
-  writeFileAtomically(script, fmt::format("#!/bin/sh\n"
-                                          "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && export LD_PRELOAD=\"{}\"\n"
-                                          "exec \"{}\" \"$@\"\n",
-                                          card, CURVISPLAT_PROGRAM));
-  fs::permissions(script, fs::perms::owner_all);
+  const std::string script = atRank(1, "export LD_PRELOAD=\"" + card + '"', "\"$@\"");
   const ProgramResult result = runAsRanks(3, words, script);
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(lineCount(result.err), 1) << result.err;

@@ -381,10 +381,12 @@ void addConvert(CLI::App& app) {
     if (arguments->dry_run && !launchedRanks().alone())
       throw UsageError("--dry-run runs in one process; start curvisplat without mpirun");
     runTraced(arguments->trace, gridAndCaches(*arguments), [&] {
-      if (series)
+      if (series) {
         runConvertSeries(*arguments);
-      else
+      } else {
+        requireSameSteps(1);
         adds ? runAddScalar(*arguments) : runConvert(*arguments);
+      }
       noteForeign(*arguments);
     });
   });

@@ -315,6 +315,7 @@ void runConvertSeries(ConvertArguments arguments) {
   options.convert.ranks = &ranks;
   const SeriesInput input = seriesInput(arguments, steps, steps);
   if (arguments.dry_run) return dryRunOfSeries(input, options, arguments);
+  requireSameSteps(steps.size());
 
   requireThreads(arguments.threads);
   Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};

@@ -23,6 +23,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/plugin.h"
+#include "stream/base/text.h"
 
 namespace curvisplat {
 namespace {
@@ -156,6 +157,13 @@ void requireSameOptions(const CLI::App& command) {
     if (in(here, name) != in(first, name))
       throw UsageError("{} is {:.100} here and {:.100} at rank 0; start all ranks with the same options",
                        name, in(here, name), in(first, name));
+}
+
+void requireSameSteps(uint64_t steps) {
+  const uint64_t first = fromBytes<uint64_t>(launchedRanks().broadcast(toBytes(std::vector{steps})))[0];
+  if (steps != first)
+    throw Error("the files are {} here and {} at rank 0; give all ranks the same files",
+                countText(steps, "time step"), countText(first, "time step"));
 }
 
 StopRanksWith::StopRanksWith(Ranks& ranks, const Progress& progress) : ranks_(ranks) {
