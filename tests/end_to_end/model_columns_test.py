@@ -99,6 +99,24 @@ class Columns(ModelFileTest):
             self.field(f, "face", "layer")
         self.expect("zCoordinates", "out2d_1.nc", "temperature_1.nc", "zCoordinates_1.nc")
 
+    def test_nodes_that_are_counted_otherwise_than_stated(self):
+        """From 1 without a start_index, or from 0 with one of 1; but a fill value of 0 is none of the nodes."""
+        for shift, start, said in ((1, None, "faces has the nodes 1 to 7, which are counted from 1; its start_index is missing"),
+                                   (1, 0, "faces has the nodes 1 to 7, which are counted from 1; its start_index is 0"),
+                                   (0, 1, "faces has the nodes 0 to 6, which are counted from 0; its start_index is 1"), (1, 1, None), (0, 0, None)):
+            for fill in (-1, 0) if shift == 1 and start == 1 else (-1,):
+                with self.subTest(shift=shift, start=start, fill=fill):
+                    with self.mesh() as f:
+                        f["faces"][:] = np.where(FACES < 0, -1 if fill else 0, FACES + shift)
+                        if start is not None:
+                            f["faces"].start_index = np.int32(start)
+                        f.add("depths", "time face interface", np.broadcast_to(-LEVELS, (1, 3, 5)), units="m", standard_name="depth", positive="down")
+                    self.expect("depths")
+                    self.assertEqual([line for line in self.info()["warnings"] if "start_index" in line], [said] if said else [])
+        with self.mesh() as f:
+            f["faces"][:] = np.where(FACES < 0, -1, FACES + 2)
+        self.assertIn("face 1 has the node 7; expected 0 to 6; the file is damaged", self.info(fails=True))
+
     def test_places_without_units(self):
         """The standard_name says that they are lengths; numbers that are no degrees are refused."""
         def write(**attributes):

@@ -61,6 +61,7 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
       heights_(findColumnsHeights(file_, map_, scalars_)),
       bottom_(findColumnsBottom(file_, map_, scalars_)) {
   findTimes(options);
+  findFirstNode();
   const std::string unit = lowerCase(map_.longitude->text("units"));
   const auto length = kilometresOf(unit);
   const bool radians =
@@ -151,20 +152,60 @@ void ColumnsSource::forEachPart(uint64_t first, uint64_t count, uint64_t columns
   }
 }
 
-std::vector<int64_t> ColumnsSource::nodesOf(uint64_t first, uint64_t count) const {
+std::vector<double> ColumnsSource::storedNodesOf(uint64_t first, uint64_t count) const {
   const NetcdfVariable& variable = *map_.nodes_of_face;
-  const bool faces_first = variable.dims[0] == map_.face_dim;
   const uint64_t sides = map_.most_sides;
   std::vector<double> stored(count * sides);
-  const NetcdfBox box =
-      faces_first ? NetcdfBox{{first, 0}, {count, sides}} : NetcdfBox{{0, first}, {sides, count}};
-  if (!stored.empty()) file_.read(variable, box, std::span(stored));
+  if (stored.empty()) return stored;
+  const bool faces_first = variable.dims[0] == map_.face_dim;
+  file_.read(variable,
+             faces_first ? NetcdfBox{{first, 0}, {count, sides}} : NetcdfBox{{0, first}, {sides, count}},
+             std::span(stored));
+  if (faces_first) return stored;
+  std::vector<double> by_face(stored.size());
+  for (uint64_t n = 0; n < count; ++n)
+    for (uint64_t side = 0; side < sides; ++side) by_face[n * sides + side] = stored[side * count + n];
+  return by_face;
+}
+
+void ColumnsSource::findFirstNode() {
+  if (map_.format != "UGRID") return;
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  bool zero_is_node = false;  // rather than a fill value, which is no face's first, second or third node
+  for (uint64_t first = 0; first < map_.faces; first += kFacesAtOnce) {
+    const uint64_t count = std::min(kFacesAtOnce, map_.faces - first);
+    const std::vector<double> stored = storedNodesOf(first, count);
+    for (size_t n = 0; n < stored.size(); n += map_.most_sides) {
+      const double a = stored[n], b = stored[n + 1], c = stored[n + 2];
+      zero_is_node |= a * b * c == 0 && a != b && b != c && c != a;
+    }
+    for (const double node : stored) {
+      if (!(node >= 0)) continue;  // a fill value
+      least = std::min(least, node);
+      most = std::max(most, node);
+    }
+  }
+  const auto nodes = static_cast<double>(map_.nodes);
+  const bool from_one = map_.first_node == 0 && least == 1 && most == nodes;
+  const bool from_zero = map_.first_node == 1 && zero_is_node && most < nodes;
+  if (!from_one && !from_zero) return;
+  description_.warnings.push_back(fmt::format(
+      "{} has the nodes {:g} to {:g}, which are counted from {:g}; its start_index {}",
+      map_.nodes_of_face->name, least, most, 1 - map_.first_node,
+      map_.nodes_of_face->attributes.contains("start_index") ? fmt::format("is {:g}", map_.first_node)
+                                                             : "is missing"));
+  map_.first_node = 1 - map_.first_node;
+}
+
+std::vector<int64_t> ColumnsSource::nodesOf(uint64_t first, uint64_t count) const {
+  const uint64_t sides = map_.most_sides;
+  const std::vector<double> stored = storedNodesOf(first, count);
   std::vector<double> given(count, static_cast<double>(sides));
   if (map_.sides && count > 0) file_.read(*map_.sides, {{first}, {count}}, std::span(given));
   std::vector<int64_t> nodes(count * sides, -1);
   for (uint64_t n = 0; n < count; ++n)
     for (uint64_t side = 0; side < sides && static_cast<double>(side) < given[n]; ++side) {
-      const double node = stored[faces_first ? n * sides + side : side * count + n] - map_.first_node;
+      const double node = stored[n * sides + side] - map_.first_node;
       if (std::isnan(node) || (node < 0 && map_.format == "UGRID")) break;  // a fill value: fewer sides
       if (!(node >= 0 && node < static_cast<double>(map_.nodes)))
         throw Error("{}: face {} has the node {:g}; expected {} to {}; the file is damaged",

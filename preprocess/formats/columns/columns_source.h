@@ -43,6 +43,8 @@ class ColumnsSource final : public MeshSource {
   void forEachPart(uint64_t first, uint64_t count, uint64_t columns, uint64_t layers, const Use& use) const;
   void describe(const OpenGridOptions& options);
   void findTimes(const OpenGridOptions& options);
+  /// Corrects map_.first_node, and warns, where the numbers of a UGRID's nodes contradict it.
+  void findFirstNode();
   void spoolHeights(const std::filesystem::path& folder);
   template <typename Use>
   void forEachFace(const Use& use) const;
@@ -62,6 +64,8 @@ class ColumnsSource final : public MeshSource {
   uint64_t pointOf(uint64_t node, uint64_t level) const;
   /// How many layers from the top have data in some columns: faces, or nodes, by the scalars' centring.
   std::vector<double> layersOf(uint64_t first, uint64_t count) const;
+  /// The nodes of some faces, `sides` of each, as they are stored.
+  std::vector<double> storedNodesOf(uint64_t first, uint64_t count) const;
   /// The nodes of some faces: `sides` of each, -1 where there are fewer.
   std::vector<int64_t> nodesOf(uint64_t first, uint64_t count) const;
 
