@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <new>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +22,7 @@
 #include "render/export/iso_mesh_file.h"
 #include "render/export/vdb_file.h"
 #include "render/frame/frame.h"
+#include "render/image/too_little_memory.h"
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
@@ -211,6 +214,34 @@ void exportVdb(const ExportArguments& arguments) {
             mebibytesOf(arguments.output));
 }
 
+/// Why there was no memory for a comparison; empty if it failed for another reason.
+std::string lackOfMemory(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error)) return "out of memory";
+  if (dynamic_cast<const TooLittleMemory*>(&error)) return error.what();
+  return isForLackOfThreads(error) ? kNoThread : "";
+}
+
+/// What `compare` finds; nothing where there is no memory for it, which is no more than a warning: `file` is complete.
+std::optional<Comparison> comparisonOf(const std::string& file, const std::function<Comparison()>& compare,
+                                       Progress& progress) {
+  try {
+    return compare();
+  } catch (const Interrupted& interrupted) {
+    throw Interrupted(interrupted.signal(),
+                      fmt::format("{}: is complete; its comparison was interrupted", file));
+  } catch (const std::exception& error) {
+    const std::string lack = lackOfMemory(error);
+    if (lack.empty())
+      throw Error("{}: is complete; it was not compared with curvisplat's pictures (--no-comparison): {}",
+                  file, error.what());
+    progress.end();
+    printMessage(
+        "warning: {}: is complete; it was not compared with curvisplat's pictures (--no-comparison): {}",
+        file, lack);
+    return {};
+  }
+}
+
 /// Grids hold the scalar itself, as it is stored, and isosurfaces one value of it; splats are drawn.
 void refuseOptionsOfOtherFiles(const ExportArguments& arguments, bool splats) {
   if (splats && arguments.voxels)
@@ -269,17 +300,12 @@ void exportCache(ExportArguments& arguments) {
   printLine("{}: {} splats of {}, {:.1f} MiB", arguments.output.string(), splats.size(),
             cache.manifest().variables[variable].name, mebibytesOf(arguments.output));
   if (!arguments.no_comparison) {
-    try {
-      const Comparison found = compare(cache, variable, function, splats, memory, progress);
+    const auto found = comparisonOf(
+        arguments.output.string(),
+        [&] { return compare(cache, variable, function, splats, memory, progress); }, progress);
+    if (found)
       fmt::print("against curvisplat's own pictures from 12 directions: {:.1f} dB, {:.1f} dB at worst\n",
-                 found.mean_db, found.least_db);
-    } catch (const Interrupted& interrupted) {
-      throw Interrupted(interrupted.signal(), fmt::format("{}: is complete; its comparison was interrupted",
-                                                          arguments.output.string()));
-    } catch (const Error& error) {
-      throw Error("{}: is complete; it was not compared with curvisplat's pictures (--no-comparison): {}",
-                  arguments.output.string(), error.what());
-    }
+                 found->mean_db, found->least_db);
   }
   if (arguments.output.extension() == ".spz") {
     const SpzFrame frame = spzFrameOf(splats);
