@@ -20,6 +20,7 @@
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/checksum.h"
 #include "stream/base/mutex.h"
+#include "stream/base/name_list.h"
 #include "stream/base/trace.h"
 
 namespace curvisplat {
@@ -94,12 +95,38 @@ std::optional<ScalarRange> rangeThatIsLost(const DataSource& source, uint32_t sc
   return range;
 }
 
+/// PLOT3D's functions that hold for absolute pressures. The first three, temperature, enthalpy and internal energy, have its sign.
+constexpr std::array<uint32_t, 7> kOfGas{120, 130, 140, 112, 113, 163, 170};
+
+/// A warning of derived ones among the scalars where the pressure is negative somewhere; may be empty.
+std::string warningOfGaugePressure(const DataSource& source, std::span<const uint32_t> scalars) {
+  const auto isOfFirst = [](const GridScalar& scalar, size_t count) {
+    const auto end = kOfGas.begin() + static_cast<ptrdiff_t>(count);
+    return scalar.derived && std::find(kOfGas.begin(), end, scalar.function) != end;
+  };
+  const std::vector<GridScalar>& all = source.description().scalars;
+  std::vector<std::string> wrong;
+  for (const uint32_t scalar : scalars)
+    if (isOfFirst(all[scalar], kOfGas.size())) wrong.push_back(all[scalar].name);
+  // It has no value where the pressure is blanked.
+  const auto signed_one = std::ranges::find_if(all, [&](const auto& scalar) { return isOfFirst(scalar, 3); });
+  if (wrong.empty() || signed_one == all.end()) return "";
+  const auto values = someValues(source, static_cast<uint32_t>(signed_one - all.begin()));
+  if (std::ranges::none_of(values, [](float value) { return value < 0; })) return "";
+  return fmt::format(
+      "{}: computed from an absolute pressure, but the pressure is negative at some samples, as a gauge "
+      "pressure is; the values are wrong",
+      listed(wrong));
+}
+
 }  // namespace
 
 std::vector<std::string> warningsOfRanges(const DataSource& source, std::span<const uint32_t> scalars,
                                           std::span<const ScalarRange> ranges) {
   constexpr double kMinNormal = std::numeric_limits<float>::min();
   std::vector<std::string> sentences;
+  if (std::string warning = warningOfGaugePressure(source, scalars); !warning.empty())
+    sentences.push_back(std::move(warning));
   for (size_t n = 0; n < scalars.size(); ++n) {
     const GridScalar& scalar = source.description().scalars[scalars[n]];
     const double largest = std::max(std::abs(ranges[n].min), std::abs(ranges[n].max));

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/survey/grid_survey.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -104,6 +105,26 @@ TEST(DerivedMesh, CellsRangesGasAndBlankValues) {
   EXPECT_TRUE(std::isnan(cells.scalars.at(0).at(0)));  // its energy is the value of blanked samples
   options.gas.gamma = 0.5;
   EXPECT_THROW(conserved(Centring::kCell, options), UsageError);
+}
+
+TEST(DerivedMesh, WarnsOfAGaugePressure) {
+  for (const float least : {-4.0f, 4.0f}) {
+    const DerivedMeshSource mesh(
+        std::make_unique<FlowMesh>(
+            std::vector<std::string>{"Density", "Pressure", "Velocity_x", "Velocity_y", "Velocity_z"},
+            std::vector<std::vector<float>>{{1, 1}, {least, 5}, {1, 1}, {0, 0}, {0, 0}}, Centring::kNode),
+        {});
+    const std::vector<ScalarRange> ranges(3, {0, 1});
+    const uint32_t wanted[] = {*scalarOf(mesh.description(), "mach_number"),
+                               *scalarOf(mesh.description(), "velocity_magnitude"),
+                               *scalarOf(mesh.description(), "entropy")};
+    const std::vector<std::string> warnings = warningsOfRanges(mesh, wanted, ranges);
+    ASSERT_EQ(warnings.size(), least < 0 ? 1u : 0u);
+    if (least > 0) continue;
+    EXPECT_TRUE(warnings[0].starts_with("mach_number, entropy: computed from an absolute pressure"))
+        << warnings[0];
+    EXPECT_TRUE(warningsOfRanges(mesh, std::span(wanted).subspan(1, 1), std::span(ranges).first(1)).empty());
+  }
 }
 
 TEST(DerivedMesh, WhatIsStoredOrNeedsGradientsIsNotOffered) {
