@@ -246,6 +246,28 @@ TEST_F(OddFiles, WithoutThreadsItEndsWithOneLine) {
   }
 }
 
+TEST_F(OddFiles, AnExportIsCompleteWhereItsComparisonFindsNoMemory) {
+  if (kIsSanitized) GTEST_SKIP() << "sanitizers take more address space than there is";
+  const std::string warning = "warning: b.ply: is complete; it was not compared with curvisplat's pictures";
+  bool has_warned = false;
+  const auto expectComplete = [&](const ProgramResult& result) {
+    if (result.out.find("b.ply: ") == std::string::npos) return;  // not even written
+    EXPECT_EQ(result.status, 0) << result.err;
+    const bool compared = result.out.find("against curvisplat's own pictures") != std::string::npos;
+    EXPECT_EQ(compared ? "" : result.err.substr(0, result.err.find(" (")),
+              compared ? "" : "curvisplat: " + warning);
+    EXPECT_EQ(lineCount(result.err), compared ? 0 : 1) << result.err;
+    has_warned |= !compared;
+  };
+  const std::string command = "export cube.splats -o b.ply";
+  for (int mebibytes = 100; mebibytes < 700; mebibytes += faults::isWholeSweep() ? 10 : 60)
+    expectComplete(runWithin(folder_, command, 1024 * mebibytes));
+  EXPECT_TRUE(has_warned);
+  has_warned = false;
+  expectComplete(runWithin(folder_, command + " --memory 1M", 4 << 20));
+  EXPECT_TRUE(has_warned);
+}
+
 // Just below what suffices, the buffers of a frame fit and leave nothing for what glibc allocates when a thread begins.
 TEST_F(OddFiles, AFrameWhoseBuffersJustFitEndsWithOneLine) {
   if (kIsSanitized) GTEST_SKIP() << "sanitizers take more address space than there is";
