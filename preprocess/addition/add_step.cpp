@@ -153,7 +153,7 @@ class StepAddition {
         options_.time ? options_.time : timeOf(source_.description(), unit());
     report_.time = stated.value_or(last + 1);
     if (!(report_.time > last) || !std::isfinite(report_.time))
-      throw Error("its time {:g} is not after {:g}, the time of the step before it", report_.time, last);
+      throw Error("its time {} is not after {}, the time of the step before it", report_.time, last);
   }
 
   template <typename Work>

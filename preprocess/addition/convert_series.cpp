@@ -246,7 +246,7 @@ class SeriesConversion {
       if (!sources_.contains(file))
         throw Error("the cache was not made from {}; to convert anew, add --overwrite", file);
     if (time != times_[next_])
-      throw Error("its time {:g} is not {:g}, that of step {} of the cache; to convert anew, add --overwrite",
+      throw Error("its time {} is not {}, that of step {} of the cache; to convert anew, add --overwrite",
                   time, times_[next_], next_);
   }
 

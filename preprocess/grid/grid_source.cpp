@@ -78,8 +78,12 @@ uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
 std::optional<std::string> timesText(const GridDescription& description) {
   const std::vector<double>& times = description.times;
   if (times.size() < 2) return std::nullopt;
-  return fmt::format("{} time steps from {} to {}", times.size(), numberText(times.front()),
-                     numberText(times.back()));
+  constexpr int kMaxDigits = 17;
+  int digits = 6;
+  while (digits < kMaxDigits && numberText(times[0], digits) == numberText(times[1], digits)) ++digits;
+  if (digits > 6) digits = std::min(digits + 2, kMaxDigits);  // where they tell the first steps apart
+  return fmt::format("{} time steps from {} to {}", times.size(), numberText(times.front(), digits),
+                     numberText(times.back(), digits));
 }
 
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked) {

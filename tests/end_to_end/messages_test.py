@@ -57,6 +57,8 @@ class Messages(FormatCase):
                  "a.msh": ("(0 machine configuration:)\n(4 (60 0 0 1 2 4 4 4 8 4 8 4))\n(3010 (1 1 8 1 3)(\0\0\0\1" + 200 * "\0", "a Fluent mesh"),
                  "b.msh": ("$NOD\n4\n" + "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n" + "$ENDNOD\n$ELM\n1\n1 4 1 1 4 1 2 3 4\n$ENDELM\n", "a Gmsh mesh of version 1"),
                  "a.tec": ("\ufeffVARIABLES = x y z\nZONE I=2 J=2 K=2\n", "begins with a byte order mark"),
+                 "a.vtk": ("# vtk DataFile Version 3.0\nt\nASCII\nFIELD FieldData 1\nx 1 3 float\n1 2 3\n", "has field data alone, without a grid; expected STRUCTURED_GRID"),
+                 "b.vtk": ("# vtk DataFile Version 3.0\nt\nASCII\nDATASET FIELD FieldData 1\nx 1 3 float\n1 2 3\n", "has field data alone, without a grid; expected STRUCTURED_GRID"),
                  "CHGCAR": ("Si\n 1.0\n", "of VASP"), "d3plot": ("\1" * 300, "of LS-DYNA")}
         for name, (text, words) in files.items():
             with self.subTest(name):
@@ -69,7 +71,9 @@ class Messages(FormatCase):
         for path, command in ((case, "info"), (self.write("case/case.foam", ""), "info"), (case, "render"), (case, "convert")):
             result = self.run_program(command, path, *([] if command == "info" else ["-o", self.folder / ("a.png" if command == "render" else "a.splats")]))
             self.assertEqual((result.returncode, result.stderr.count("\n")), (1, 1), result.stderr)
-            self.assertIn("an OpenFOAM case without a mesh", result.stderr)
+            self.assertIn("an OpenFOAM case without a mesh: there is no constant/polyMesh (blockMesh", result.stderr)
+        self.write("case/constant/polyMesh/blockMeshDict", "FoamFile\n{\n}\n")
+        self.assertIn("without a mesh: constant/polyMesh lacks the file faces (blockMesh", self.run_program("info", case).stderr)
         for name, words in (("plt00010/Header", "a plotfile of AMReX"), ("sim.bp/md.idx", "an ADIOS2 file")):
             (self.folder / "plt00010" / "Level_0").mkdir(parents=True, exist_ok=True)
             self.assertIn(words, self.run_program("info", self.write(name, "x").parent).stderr)
@@ -83,7 +87,7 @@ class Messages(FormatCase):
         self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
         grid = self.write("alone.xyz", f"1\n{NI} {NJ} {NK}\n" + "".join(numbers(POINTS[..., axis]) for axis in range(3)))
         picture = ("-o", self.folder / "a.png", "--size", "20x20")
-        self.assertIn("choose a derived one with --scalar", self.run_program("render", grid, *picture).stderr)
+        self.assertIn("give a Q or function file as well, or choose a derived one with --scalar", self.run_program("render", grid, *picture).stderr)
         for scalar in ("volume", "jacobian"):  # the second is added to the cache of the first
             result = self.run_program("render", grid, "--scalar", scalar, *picture)
             self.assertEqual((result.returncode, scalar in result.stdout), (0, True), result.stderr)
@@ -111,6 +115,12 @@ class Messages(FormatCase):
         with h5py.File(self.folder / "a.h5", "w") as f:
             f.attrs["openPMD"] = "1.1.0"
         self.assertIn("an openPMD file", self.run_program("info", self.folder / "a.h5").stderr)
+        with h5py.File(self.folder / "b.h5", "w") as f:
+            f["p"] = [1.0, 2.0]
+        self.assertIn("describe its arrays in an XDMF file", self.run_program("info", self.folder / "b.h5").stderr)
+        for name in ("b.h5.xdmf", "b.xmf"):
+            described = self.write(name, "<Xdmf/>")
+            self.assertIn(f"give {described} instead, which may describe its arrays", self.run_program("info", self.folder / "b.h5").stderr)
 
     def write(self, name, text):
         path = self.folder / name

@@ -115,7 +115,19 @@ class Columns(ModelFileTest):
                     self.assertEqual([line for line in self.info()["warnings"] if "start_index" in line], [said] if said else [])
         with self.mesh() as f:
             f["faces"][:] = np.where(FACES < 0, -1, FACES + 2)
+            f.add("layer", "layer", MIDDLES, units="m", positive="up")
         self.assertIn("face 1 has the node 7; expected 0 to 6; the file is damaged", self.info(fails=True))
+
+    def test_what_lacks_is_said(self):
+        self.mesh(at=None).close()
+        self.assertIn("is a grid of UGRID alone; give the file with its scalars before it", self.info(fails=True))
+        with self.mesh(at=None) as f:
+            f.add("h", "time face", np.ones((1, 3)), "f4")
+        self.assertIn("is a grid of UGRID, but no scalar has layers: no part of it has a volume (found h)", self.info(fails=True))
+        with File(self.folder / "file.nc", {"nodeCount": 7, "elementCount": 3, "maxNodePElement": 4, "coordDim": 2}) as f:
+            f.add("nodeCoords", "nodeCount coordDim", np.stack([X, Y], -1) / 1e4, units="degrees")
+            f.add("elementConn", "elementCount maxNodePElement", FACES + 1, "i4", -1)
+        self.assertIn("is a mesh of ESMF, whose faces have neither layers nor scalars", self.info(fails=True))
 
     def test_places_without_units(self):
         """The standard_name says that they are lengths; numbers that are no degrees are refused."""

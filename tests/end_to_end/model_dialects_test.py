@@ -600,6 +600,15 @@ class Fields(ModelFileTest):
         info = self.info()
         self.assertEqual([s["name"] for s in info["scalars"]], ["T"])
 
+    def test_times_have_the_digits_that_tell_steps_apart(self):
+        with self.file(lon=12, lat=8, lev=3, time=4) as f:
+            self.air(f)
+            f.add("lev", "lev", [0, 1000, 3000], units="m", positive="up")
+            f.add("time", "time", 2459300.5 + np.arange(4) / 24, units="days since -4713-01-01")
+            f.add("T", "time lev lat lon", RANDOM.random((4, 3, 8, 12)), "f4")
+        done = subprocess.run([PROGRAM, "convert", self.folder / "file.nc", "-o", self.folder / "s.splats"], check=True, capture_output=True, text=True)
+        self.assertIn("4 time steps from 2459300.5 to 2459300.62", done.stderr)
+
     def test_months_and_members_are_steps(self):
         t = RANDOM.random((5, 3, 8, 12)).astype("f4")
         for name, values, times in (("month", [1, 2, 3, 4, 5], [1, 2, 3, 4, 5]), ("member", None, [0, 1, 2, 3, 4]), ("region", [3, 1, 4, 1, 5], [0, 1, 2, 3, 4])):

@@ -30,6 +30,12 @@ bool isOfMapAlone(std::string_view dimension) {
 
 using Variables = std::vector<const NetcdfVariable*>;
 
+std::vector<std::string> namesOf(const Variables& variables) {
+  std::vector<std::string> names;
+  for (const NetcdfVariable* const variable : variables) names.push_back(variable->name);
+  return names;
+}
+
 /// Fields over the map without layers, which have no volume. Says that they are left out where nothing else of their file is read,
 /// since they are what its user wants to see. Throws Error if one of them is wanted.
 void leaveOutFlat(const NetcdfFiles& file, const Variables& flat, const std::vector<ColumnsScalars>& groups,
@@ -112,10 +118,12 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     }
   });
   if (groups.empty() && !lacking.empty()) throw Error("{}", lacking);
+  if (groups.empty() && flat.empty())
+    throw Error("{}: is a grid of {} alone; give the file with its scalars before it (convert DATA GRID)",
+                file.path().string(), map.format);
   if (groups.empty())
-    throw Error(
-        "{}: is a grid of {} without a variable of faces or nodes and layers: no part of it has a volume",
-        file.path().string(), map.format);
+    throw Error("{}: is a grid of {}, but no scalar has layers: no part of it has a volume (found {})",
+                file.path().string(), map.format, listed(namesOf(flat), 3));
   auto chosen = std::max_element(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
     return a.variables.size() < b.variables.size();
   });

@@ -17,6 +17,7 @@
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "stream/base/name_list.h"
 #include "stream/base/text.h"
 
@@ -86,6 +87,17 @@ NetcdfSource::NetcdfSource(const OpenGridOptions& options, const NetcdfSource* b
 
 namespace {
 
+/// What to do with arrays that an XDMF file beside them may describe.
+std::string adviceOnHdf5(const std::filesystem::path& path) {
+  for (const char* const ending : {".xmf", ".xdmf"})
+    for (const std::filesystem::path& name : {path.stem(), path.filename()}) {
+      const std::filesystem::path beside = path.parent_path() / (name.string() + ending);
+      if (isRegularFile(beside))
+        return fmt::format("give {} instead, which may describe its arrays", beside.string());
+    }
+  return "describe its arrays in an XDMF file (.xmf), or write NetCDF-4 or CGNS";
+}
+
 /// The variable that comes nearest to a grid's, and what it lacks.
 std::string nearestToGrid(const NetcdfFiles& file) {
   const NetcdfVariable* nearest = nullptr;
@@ -132,7 +144,7 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
   if (found.grids.empty()) {
     if (const auto format = foreignNetcdf(file))
       throw Error("{}: is {}; {}", file.path().string(), *format,
-                  file.plainHdf5() ? "describe its arrays in an XDMF file (.xmf), or write NetCDF-4 or CGNS"
+                  file.plainHdf5() ? adviceOnHdf5(file.path())
                                    : "structured grids are read, and UGRID, ICON, MPAS and FESOM with the "
                                      "file of their faces and nodes (give it after this one)");
     std::string why = nearestToGrid(file);

@@ -410,10 +410,12 @@ std::optional<std::string> foreignFolder(const std::filesystem::path& folder) {
   for (const char* mark : {"md.idx", "data.0"})
     if (std::filesystem::is_regular_file(folder / mark, error))
       return "an ADIOS2 file (.bp), which is not read (save it as VTK, with ParaView)";
-  if (std::filesystem::is_regular_file(folder / "system" / "controlDict", error) && !isFoamCase(folder))
-    return "an OpenFOAM case without a mesh: there is no constant/polyMesh (blockMesh, or what else the "
-           "case's "
-           "Allrun calls, makes it)";
+  if (std::filesystem::is_regular_file(folder / "system" / "controlDict", error) && !isFoamCase(folder)) {
+    const bool has_folder = std::filesystem::is_directory(folder / "constant" / "polyMesh", error);
+    return fmt::format(
+        "an OpenFOAM case without a mesh: {} (blockMesh, or what else the case's Allrun calls, makes it)",
+        has_folder ? "constant/polyMesh lacks the file faces" : "there is no constant/polyMesh");
+  }
   const std::filesystem::path around = folderOf(folder.has_filename() ? folder : folder.parent_path());
   const bool is_cache = std::filesystem::exists(folder / "manifest.json", error) ||
                         folder.string().find(".splats") != std::string::npos;

@@ -150,7 +150,10 @@ std::vector<uint32_t> candidatesFor(const GridDescription& description, const st
 std::string sourceOfScalars(const GridDescription& description) {
   const bool is_su2 = description.format.starts_with("SU2");
   if (!is_su2 && !description.pieces.empty()) return "";
-  return fmt::format("; give a {} file as well", is_su2 ? "restart" : "Q or function");
+  const bool is_plot3d = description.format.empty() || description.format.find("PLOT3D") != std::string::npos;
+  return fmt::format("; give {} as well", is_su2      ? "a restart file"
+                                          : is_plot3d ? "a Q or function file"
+                                                      : "the file with its scalars");
 }
 
 std::string namesIn(const GridDescription& description) {
@@ -311,8 +314,8 @@ std::vector<uint32_t> scalarsNamed(const GridDescription& description,
     throw UsageError("the files contain no scalar{}", sourceOfScalars(description));
   if (names.empty()) {
     if (description.scalars.front().derived)
-      throw UsageError("the files contain no scalar; choose a derived one with --scalar; {}",
-                       namesIn(description));
+      throw UsageError("the files contain no scalar{}, or choose a derived one with --scalar; {}",
+                       sourceOfScalars(description), namesIn(description));
     return {0};
   }
   std::vector<uint32_t> positions;

@@ -81,6 +81,10 @@ class LegacyReader : VtkLegacyFile {
     for (; word == "field" || word == "metadata"; word = nextWord())
       word == "field" ? readField() : skipMetadata();
     dataset_ = nextWord();
+    constexpr const char* kExpected =
+        "expected STRUCTURED_GRID, RECTILINEAR_GRID, STRUCTURED_POINTS or UNSTRUCTURED_GRID";
+    if (word.empty() || (word == "dataset" && dataset_ == "field"))
+      fail("has field data alone, without a grid; {}", kExpected);
     if (word != "dataset") fail("found \"{}\"; expected DATASET", word.substr(0, 30));
     std::transform(dataset_.begin(), dataset_.end(), dataset_.begin(),
                    [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
@@ -94,8 +98,7 @@ class LegacyReader : VtkLegacyFile {
     if (wants_lines_)
       fail("is a {}; lines and points are in POLYDATA or UNSTRUCTURED_GRID", dataset_.substr(0, 30));
     if (!uniform_ && !unstructured_ && dataset_ != "STRUCTURED_GRID" && dataset_ != "RECTILINEAR_GRID")
-      fail("is a {}; expected STRUCTURED_GRID, RECTILINEAR_GRID, STRUCTURED_POINTS or UNSTRUCTURED_GRID",
-           dataset_.substr(0, 30));
+      fail("is a {}; {}", dataset_.substr(0, 30), kExpected);
     if (dataset_ == "RECTILINEAR_GRID") piece_.nodes = VtkAxes{};
     if (uniform_) piece_.nodes = VtkUniformNodes{};
   }
