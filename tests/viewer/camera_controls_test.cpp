@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
+#include "render/camera/camera_path.h"
 #include "render/project/screen_view.h"
 
 namespace curvisplat {
@@ -41,6 +42,35 @@ class CameraControls : public testing::TestWithParam<Projection> {
 };
 INSTANTIATE_TEST_SUITE_P(, CameraControls,
                          testing::Values(Projection::kOrthographic, Projection::kPerspective));
+
+/// A long box that is seen from its end is whole from its sides, too; in the first picture it may be smaller for that.
+TEST_P(CameraControls, OnceAroundTheBoxIsWhole) {
+  const glm::dvec3 lower(-5, -1, -1), upper(5, 1, 1);
+  Camera camera = Camera::named("+x", lower, upper, kSize, GetParam());
+  const auto outermost = [&](const Camera& seen_by) {
+    double most = 0;
+    for (int n = 0; n < 8; ++n) {
+      const glm::dvec3 corner(n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y,
+                              n & 4 ? upper.z : lower.z);
+      const glm::dvec2 from =
+          glm::abs(pixelOf(seen_by, corner) - glm::dvec2(150, 100)) / glm::dvec2(150, 100);
+      most = std::max({most, from.x, from.y});
+    }
+    return most;
+  };
+  EXPECT_LT(outermost(camera), 1);
+  EXPECT_GT(outermost(orbited(camera, 90)), 1);
+  const Camera held = heldOnceAround(camera, lower, upper, kSize);
+  double most = 0;
+  for (int degrees = 0; degrees < 360; ++degrees) most = std::max(most, outermost(orbited(held, degrees)));
+  EXPECT_LE(most, 1);
+  EXPECT_GT(most, 0.95);
+  // A detail stays as large as it is shown, and what is whole already is not moved.
+  camera = zoomed(camera, 4);
+  EXPECT_EQ(heldOnceAround(camera, lower, upper, kSize).position, camera.position);
+  camera = zoomed(camera, 0.01);
+  EXPECT_EQ(heldOnceAround(camera, lower, upper, kSize).position, camera.position);
+}
 
 TEST_P(CameraControls, APointAtTheFocalDepthFollowsThePan) {
   const Camera after = panned(camera_, {31, -17}, kSize);

@@ -132,6 +132,40 @@ Camera refitted(const Camera& camera, const glm::dvec3& lower, const glm::dvec3&
 
 namespace {
 
+/// How many times as far away the camera has to be to show the whole box.
+double neededDistance(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper,
+                      ImageSize size) {
+  const ViewAxes axes = camera.axes();
+  const bool perspective = camera.projection == Projection::kPerspective;
+  const double half_height = perspective ? halfAngleTangent(camera) : camera.parallel_scale;
+  const double half_width = half_height * size.width / size.height;
+  double needed = 0;
+  for (unsigned n = 0; n < 8; ++n) {
+    const glm::dvec3 corner(n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y, n & 4 ? upper.z : lower.z);
+    const glm::dvec3 from = corner - camera.focal_point;
+    const double reach = std::max(std::abs(glm::dot(from, axes.right)) / half_width,
+                                  std::abs(glm::dot(from, axes.up)) / half_height);
+    needed =
+        std::max(needed, perspective ? (reach - glm::dot(from, axes.forward)) / distanceOf(camera) : reach);
+  }
+  return needed;
+}
+
+}  // namespace
+
+Camera heldOnceAround(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper,
+                      ImageSize size) {
+  constexpr double kDetail = 2, kStepDegrees = 4, kMargin = 1.02;
+  const double now = neededDistance(camera, lower, upper, size);
+  if (now > kDetail) return camera;
+  double most = now;
+  for (double degrees = kStepDegrees; degrees < 360; degrees += kStepDegrees)
+    most = std::max(most, neededDistance(orbited(camera, degrees), lower, upper, size));
+  return zoomed(camera, std::min(1.0, std::max(1.0, now) / (kMargin * most)));
+}
+
+namespace {
+
 constexpr double kRestAfterSeconds = 0.2;        // no movement for this time
 constexpr double kWheelFactor = 1.1;             // per notch
 constexpr double kDragFactor = 1.01;             // per pixel

@@ -42,6 +42,10 @@ Camera holding(const Camera& camera, ImageSize from, ImageSize to);
 /// Keeps the view direction and fits the box [lower, upper] into the image.
 Camera refitted(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size);
 
+/// The camera for a movie once around it: where this one shows the box [lower, upper] whole, that one does so from all sides.
+/// Where a part lies beyond the picture's sides, at most as much of it does so from others; a small detail stays as large.
+Camera heldOnceAround(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size);
+
 /// World units per pixel at the focal point's depth.
 double unitsPerPixel(const Camera& camera, ImageSize size);
 
@@ -56,6 +60,11 @@ class Navigation {
   bool update(Window& window, Camera& camera, ImageSize size);
   /// Returns true if the command moved the camera or changed its mode.
   bool run(Command command, Camera& camera, ImageSize size);
+
+  /// heldOnceAround() of the box.
+  Camera onceAround(const Camera& camera, ImageSize size) const {
+    return heldOnceAround(camera, lower_, upper_, size);
+  }
 
   /// Whether the camera moves or moved less than 0.2 s ago, so that a coarse picture suffices.
   bool isMoving() const;
