@@ -36,6 +36,18 @@ TEST(Toasts, TheSameTextIsOne) {
   EXPECT_TRUE(toasts.shown(3).empty());
 }
 
+/// Markers that are set one after another leave one message, which hides no more of the picture than the first.
+TEST(Toasts, OneAboutTheSameTakesThePlaceOfTheLast) {
+  Toasts toasts;
+  toasts.add("cannot be read", 0, true, About::kMarker);
+  toasts.add("saved", 0);
+  toasts.add("marker 1", 0, false, About::kMarker);
+  toasts.add("marker 2", 1, false, About::kMarker);
+  ASSERT_EQ(toasts.shown(1).size(), 3u);
+  EXPECT_EQ(toasts.shown(1)[2].text, "marker 2");
+  EXPECT_EQ(toasts.log().size(), 4u);
+}
+
 /// Errors name options of the command line, which the window does not have.
 TEST(Reports, SayWhereTheOptionsAre) {
   const std::string where =

@@ -65,6 +65,8 @@ bool Toasts::add(const std::string& text, double now_s, bool is_error, About abo
     same->ends_s = ends_s;
     return false;
   }
+  if (!is_error && about != About::kNothing)
+    std::erase_if(shown_, [about](const Toast& toast) { return !toast.is_error && toast.about == about; });
   shown_.push_back({text, is_error, ends_s, about});
   if (shown_.size() > kMaxShown) shown_.pop_front();
   log_.push_back(text);

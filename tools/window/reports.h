@@ -13,14 +13,15 @@
 
 namespace curvisplat {
 
-/// Names what failed: the error goes when the next attempt at the same succeeds.
-enum class About { kNothing, kOpening, kPicture, kSaving, kFunction };
+/// Names what a message is about. An error goes when the next attempt at the same succeeds, another message when the next one of
+/// the same comes.
+enum class About { kNothing, kOpening, kPicture, kSaving, kFunction, kMarker };
 
 struct Toast {
   std::string text;
   bool is_error = false;
   double ends_s = 0;
-  About about = About::kNothing;  // of an error
+  About about = About::kNothing;
 };
 
 /// The messages that are shown, and the last ones, which can be read again. A value type.
@@ -53,7 +54,9 @@ class Reports {
   /// `clock_s` tells the time for `toasts`, which must outlive this.
   Reports(Toasts& toasts, double (*clock_s)()) : toasts_(toasts), clock_s_(clock_s) {}
 
-  void say(const std::string& text) { toasts_.add(text, clock_s_()); }
+  void say(const std::string& text, About about = About::kNothing) {
+    toasts_.add(text, clock_s_(), false, about);
+  }
   /// Calls `act`. Returns false if it threw an error, which is reported as one about `about`.
   bool attempt(const std::function<void()>& act, About about = About::kNothing);
   /// Shows and prints the error, but not again while it is shown.
