@@ -177,8 +177,16 @@ TEST_F(WindowPanels, APlaneIsTurnedInThePictureAndByNumbers) {
   press("x");
   choose("Picture", "Add a clip plane");  // facing the viewer
   const Image facing = saveAndCopy();
-  const Place tip = placeOf("tip 1");
-  drag(1, tip, {tip.first + pictureSize().width / 20, tip.second});
+  const Place tip = placeOf("tip 1"), to{tip.first + pictureSize().width / 20, tip.second};
+  moveTo(tip);
+  act({"mousedown", "1"});
+  placeOf("plane turned by 0°");
+  moveTo({(tip.first + to.first) / 2, tip.second});
+  moveTo(to);
+  EXPECT_TRUE(eventually([] { return hasWidget("plane turned by ") && !hasWidget("plane turned by 0°"); }));
+  act({"mouseup", "1"});
+  moveTo(rest_);
+  EXPECT_TRUE(eventually([] { return !hasWidget("plane turned by "); }));
   const Image turned = saveAndCopy();
   EXPECT_LT(difference(facing, turned), 40);
   click(placeOf("normal of clip plane 1", 0.15));  // its first field
@@ -591,6 +599,8 @@ TEST_F(WindowPanels, EditsColoursAndKeepsThemBesideThePicture) {
 TEST_F(WindowPanels, ARangeLeavesOutOnePercentAtEachEnd) {
   open();
   const Image whole = save();
+  moveTo(placeOf("full range"));
+  EXPECT_TRUE(eventually([] { return hasWidget("hint from the lowest to the highest value: 0"); }));
   click("percentile range");
   const Image most = saveAndCopy();
   EXPECT_LT(difference(whole, most), 50);

@@ -244,6 +244,7 @@ bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
   const bool open = ImGui::BeginCombo("##colours", shown.c_str(), ImGuiComboFlags_HeightLarge);
   if (!open) {
     nameWidget("colours");
+    hint("of the scalar's values along the range; opacities that were edited stay");
     return false;
   }
   if (ImGui::Selectable(EditedFunction::kAutomatic, function.isAutomatic())) result.automatic = true;
@@ -357,7 +358,9 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
   ImGui::SameLine();
   if (ImGui::Button("Full range")) set(all.min, all.max);
   nameWidget("full range");
-  hint("from the lowest to the highest value");
+  const std::string extremes =
+      fmt::format("from the lowest to the highest value: {:.6g} to {:.6g}", all.min, all.max);
+  hint(extremes.c_str());
   ImGui::SameLine();
   if (ImGui::Button("1-99 %")) try {
       if (const auto histogram = stepHistogram(cache_, variable))

@@ -5,6 +5,7 @@
 #include <imgui_stdlib.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include <algorithm>
 #include <array>
@@ -183,10 +184,16 @@ bool PlaneHandles::drawTip(ClipPlane& plane, size_t number, const glm::dvec3& mi
   const bool pressed =
       drawGrip(Grip::kTurns, handle + along, fmt::format("tip {}", number + 1), colour, scene.window);
   if (pressed && !dragged_) {
-    dragged_ = Drag{number, true, mouse(), tip, glm::dot(normal, axes.forward) > 0};
+    dragged_ = Drag{number, true, mouse(), tip, glm::dot(normal, axes.forward) > 0, normal};
     plane.point = middle;
   }
   if (!dragged_ || dragged_->number != number || !dragged_->turns) return false;
+  const std::string turn =
+      fmt::format("turned by {:.0f}°\nnormal {:.2f}, {:.2f}, {:.2f}",
+                  glm::degrees(std::acos(std::clamp(glm::dot(normal, dragged_->normal), -1.0, 1.0))),
+                  plane.normal.x, plane.normal.y, plane.normal.z);
+  ImGui::SetTooltip("%s", turn.c_str());
+  nameArea("plane " + turn.substr(0, turn.find('\n')), handle.x, handle.y, 1, 1);
   const glm::dvec2 movement = mouse() - dragged_->from;
   if (glm::length(movement) < 0.5) return false;
   const glm::dvec3 turned =

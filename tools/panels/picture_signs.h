@@ -50,6 +50,7 @@ class PlaneHandles {
     bool turns = false;
     glm::dvec2 from{0.0}, tip{0.0};  // the mouse and the normal's tip (turnedTo()) when it was pressed
     bool is_behind = false;          // the tip was farther away than the middle
+    glm::dvec3 normal{0.0};          // as it was seen then
   };
   bool drawOne(ClipPlane& plane, size_t number, const Scene& scene);
   bool drawTip(ClipPlane& plane, size_t number, const glm::dvec3& middle, const Scene& scene);
