@@ -175,6 +175,19 @@ TEST_F(WindowOpening, TheGridNeedNotComeFirst) {
   EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "a.fun", "a.xyz"}));
 }
 
+/// Several solutions of one grid have pictures of their own names, in whichever order the files are given.
+TEST_F(WindowOpening, PicturesHaveTheNameOfTheSolution) {
+  fs::copy_file("a.fun", "flow.fun", fs::copy_options::overwrite_existing);
+  cache_ = "flow";
+  for (const Words& files : {Words{"a.xyz", "flow.fun"}, {"flow.fun", "a.xyz"}}) {
+    openWith(files);
+    placeOf("curve");
+    save();  // which waits for a picture of that name
+    close();
+  }
+  cache_ = "a";
+}
+
 TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {
   openWith({});
   click("open");

@@ -116,6 +116,9 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
   openDialog("twice.png");
   clickUntil("picture size Twice that",
              [&] { return hasWidget(fmt::format("picture of {} x {}", 2 * shown.width, 2 * shown.height)); });
+  const std::vector<Widget> all = widgets();
+  const auto texts =
+      std::ranges::find_if(all, [](const Widget& one) { return one.name.starts_with("texts "); });
   press("Return");  // it is the button's where the keyboard is in no field
   ASSERT_TRUE(eventually([] { return !isOpen(); }, kLong));
   const Image twice = accept("twice.png");
@@ -129,6 +132,8 @@ TEST_F(WindowPictures, AreSavedInTwiceTheSize) {
       command[n + 1] = fmt::format("{}x{}", twice.size.width, twice.size.height);
     else if (command[n] == "--text-size")
       command[n + 1] = fmt::format("{}", 2 * std::stod(command[n + 1]));
+  ASSERT_TRUE(texts != all.end());
+  EXPECT_EQ(texts->name, fmt::format("texts {} pixels high", valueOf(command, "--text-size")));
   expectDraws(command, twice);
 }
 
@@ -290,6 +295,12 @@ TEST_F(WindowMovie, OnceAroundIsWhatRenderDraws) {
   EXPECT_EQ(valueOf(command, "--orbit"), "360");
   for (const char* const part : {"1/30", "30/30"}) draw(command, {"--part", part});  // every 30th
   for (const int frame : {0, 30, 89}) expectSame(frame);
+  // The data are whole from all sides: nothing reaches the left border.
+  for (int frame = 0; frame < 90; frame += 5) {
+    const Image seen = readImage(fmt::format("movie/m_{:04}.png", frame));
+    for (int y = 0; y < seen.size.height; ++y)
+      ASSERT_EQ(seen.pixel(0, y)[0], kDefaultBackground.r) << frame << ' ' << y;
+  }
   EXPECT_LT(difference(readImage("movie/m_0000.png"), readImage("movie/m_0030.png")), 40);
 }
 
@@ -477,7 +488,17 @@ TEST_F(WindowMovie, IsAFileThatPlays) {
   click("file name");
   answer("movie/m.mp4");
   EXPECT_TRUE(isSaved());
-  close();
+  // The same film, in the shell, and offered again.
+  press("ctrl+shift+c");
+  EXPECT_TRUE(eventually([] { return hasWidget("message copied the command for a film"); }));
+  choose("File", "Save film: once around...");
+  placeOf("picture of 201 x " + std::to_string(pictureSize().height));
+  placeOf("movie of pictures a second: 12 pictures, 1.2 s");
+  press("Escape");
+  const auto command = close().at(0);
+  EXPECT_EQ(valueOf(command, "--frames"), "12");
+  EXPECT_EQ(valueOf(command, "--frame-rate"), "10");
+  EXPECT_TRUE(valueOf(command, "--size").starts_with("200x"));
   const ProgramResult frames =
       RunningProgram({"ffprobe", "-v", "error", "-count_frames", "-show_entries",
                       "stream=width,r_frame_rate,nb_read_frames", "-of", "csv=p=0", "movie/m.mp4"},

@@ -532,9 +532,15 @@ TEST(RenderCommand, OnlySettingsWithoutAnOptionNeedAFile) {
 
 TEST(RenderCommand, OfAMovieTurns) {
   const ViewState state = firstViewOf(manifest(), {300, 200});
-  expectParts(renderCommand(state, {"a.splats", {300, 200}, {}, {}, true}), {"-o movie.mp4", "--orbit 360"});
+  CommandOptions turn{"a.splats", {300, 200}, {}, {}, kTurnFrames};
+  expectParts(renderCommand(state, turn), {"-o movie.mp4", "--orbit 360"});
+  EXPECT_EQ(renderCommand(state, turn).find("--frame"), std::string::npos);
+  turn.turn_frames = 12;
+  turn.frames_per_s = 10;
+  expectParts(renderCommand(state, turn), {"--orbit 360 --frames 12 --frame-rate 10"});
   // Without an even size render refuses to write an .mp4.
-  expectParts(renderCommand(state, {"a.splats", {301, 201}, {}, {}, true}), {"--size 300x200"});
+  turn.size = {301, 201};
+  expectParts(renderCommand(state, turn), {"--size 300x200"});
   expectParts(renderCommand(state, {"a.splats", {301, 201}, {}, {}}), {"--size 301x201"});
   CommandOptions fine{"a.xyz", {300, 200}, {}, {}};
   fine.precision = ValuePrecision::kFine;

@@ -137,8 +137,8 @@ bool FilmPanel::drawMark(const FilmEdit& film, size_t n, const TimeScale& scale,
   // The button may have been pressed, moved and released between two frames.
   if (dragging || ImGui::IsItemDeactivated()) {
     moves_ |= std::abs(mouse - pressed_x_) >= ImGui::GetIO().MouseDragThreshold;
-    const double frame = std::round(scale.timeUnderMouse() * FilmEdit::kFramesPerSecond);
-    if (moves_) actions.move = {n, frame / FilmEdit::kFramesPerSecond};
+    const double frame = std::round(scale.timeUnderMouse() * kFramesPerSecond);
+    if (moves_) actions.move = {n, frame / kFramesPerSecond};
   }
   const bool marked = n == film.selected() || ImGui::IsItemHovered();
   ImGui::GetWindowDrawList()->AddQuadFilled({x - half, y}, {x, y - half}, {x + half, y}, {x, y + half},

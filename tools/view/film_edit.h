@@ -22,7 +22,6 @@ namespace curvisplat {
 
 class FilmEdit {
  public:
-  static constexpr double kFramesPerSecond = 25;
   static constexpr double kApart = 2;        // seconds between a key frame and one that is added behind it
   static constexpr double kMinApart = 0.04;  // key frames are not moved closer than that
 

@@ -341,7 +341,7 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   std::string files = shellWord(options.cache.string());
   for (const std::filesystem::path& file : options.solutions)
     files += fmt::format(" {}", shellWord(file.string()));
-  const bool of_film = !options.film.empty(), is_movie = options.turns || of_film;
+  const bool of_film = !options.film.empty(), is_movie = options.turn_frames > 0 || of_film;
   CommandLine words(fmt::format("curvisplat render {} -o {}", files, is_movie ? "movie.mp4" : "picture.png"));
   if (options.precision != ValuePrecision::kAuto) words.add("--value-precision", wordOf(options.precision));
   const int multiple = is_movie ? 2 : 1;  // an .mp4 has an even width and height
@@ -355,7 +355,11 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   } else {
     addCamera(state.camera, words);
   }
-  if (options.turns) words.add("--orbit", "360");
+  if (options.turn_frames > 0) words.add("--orbit", "360");
+  if (options.turn_frames > 0 && options.turn_frames != kTurnFrames)
+    words.add("--frames", std::to_string(options.turn_frames));
+  if (is_movie && options.frames_per_s != kFramesPerSecond)
+    words.add("--frame-rate", number(options.frames_per_s));
   if (state.lod_pixels != 1) words.add("--lod-pixels", number(state.lod_pixels));
   // The option is left out below the usual memory, where the command draws the same picture.
   if (state.memory_bytes > ViewState::kMemoryBytes)

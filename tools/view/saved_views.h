@@ -54,7 +54,8 @@ struct CommandOptions {
   std::filesystem::path cache;
   ImageSize size;
   std::filesystem::path function_file, opacity_file;  // those that needsFile() asks for
-  bool turns = false;                                 // a movie: once around the focal point
+  uint64_t turn_frames = 0;                           // of a movie once around the focal point; 0: it is none
+  double frames_per_s = kFramesPerSecond;             // of a movie
   std::filesystem::path film = {};                    // a movie: this file's, which has what a Film states
   uint64_t film_frames = 0;
   std::vector<std::filesystem::path> solutions = {};  // where `cache` is a grid: its further files

@@ -5,6 +5,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -25,6 +26,10 @@
 namespace curvisplat {
 
 inline constexpr size_t kMaxSurfaces = 64;  // of files and of the grid
+
+/// Movies, where nothing else is chosen: as `render` draws them.
+inline constexpr double kFramesPerSecond = 25;
+inline constexpr uint64_t kTurnFrames = 90;
 
 /// A surface of a file, which loadSurfaces() reads.
 struct SurfaceFile {

@@ -30,10 +30,6 @@ double clockSeconds() {
   return glfwGetTime();
 }
 
-bool same(ImageSize a, ImageSize b) {
-  return a.width == b.width && a.height == b.height;
-}
-
 ImageSize pixelsOf(const Rectangle& place, const Window& window) {
   const auto pixels = [&](double units) {
     return std::max(1, static_cast<int>(std::lround(window.pixelScale() * units)));
@@ -99,6 +95,12 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
   reports_.attempt([&] { takeFilm(*prepared.film); });
   kept_film_ = film_.film();
   if (!options.carried || !options.carried->history) history_ = History(state_, film_);
+}
+
+std::string CacheView::name() const {
+  const std::vector<std::string>& sources = manifest().sources;
+  const bool has_solution = !grid_files_.empty() && sources.size() == 2;
+  return (has_solution ? fs::path(sources.back()) : cache_.wholePath()).stem().string();
 }
 
 /// Keys show what the clip box leaves.

@@ -29,6 +29,7 @@
 #include "tools/view/history.h"
 #include "tools/view/picture_layout.h"
 #include "tools/view/playback.h"
+#include "tools/view/saved_views.h"
 #include "tools/view/view_state.h"
 #include "tools/viewer/movie.h"
 #include "tools/viewer/navigation.h"
@@ -39,6 +40,10 @@
 #include "tools/window/window_commands.h"
 
 namespace curvisplat {
+
+inline bool same(ImageSize a, ImageSize b) {
+  return a.width == b.width && a.height == b.height;
+}
 
 /// The places of things in the window.
 struct WindowLayout {
@@ -107,6 +112,8 @@ class CacheView {
   std::optional<MovieRequest> takeWantedMovie() { return std::exchange(wanted_movie_, std::nullopt); }
   const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
   const std::filesystem::path& wholePath() const { return cache_.wholePath(); }
+  /// Begins the names of what is saved: as the solution of the grid that was opened, or as the cache.
+  std::string name() const;
   /// Whether the whole cache has the scalar, with values at other samples than those of the shown cache.
   bool hasElsewhere(const std::string& scalar) const {
     return std::ranges::find(elsewhere_, scalar) != elsewhere_.end();
@@ -138,9 +145,17 @@ class CacheView {
   void colourFaces(const std::string& scalar);
   void findIsosurface(const std::string& scalar, std::optional<uint64_t> replaced = {});
   void takeIsosurfaces();
-  void saveMovieTo(const std::filesystem::path& file, ImageSize size, std::optional<double> frames_per_s = {},
-                   uint64_t turn_frames = 0);
-  MovieRequest newMovie(const std::filesystem::path& file, std::optional<double> frames_per_s = {}) const;
+  void saveMovieTo(const FileDialog::Chosen& chosen);
+  /// What the user chose for movies of a kind.
+  struct MovieChoice {
+    std::optional<ImageSize> size = std::nullopt;  // none: as shown
+    double frames_per_s = kFramesPerSecond;
+    uint64_t turn_frames = kTurnFrames;
+  };
+  MovieRequest newMovie(MovieKind kind, const MovieChoice& choice) const;
+  MovieRequest heldMovie(MovieKind kind, const MovieChoice& choice) const;
+  MovieRequest copiedMovie(MovieKind kind) const;
+  MovieChoice movieChoice(MovieKind kind) const;
   void apply(const FilmActions& actions);
   void addKeyFrame(bool replaces);
   ViewState stateOfFilm() const;
@@ -150,7 +165,7 @@ class CacheView {
   void openFilm(const std::filesystem::path& file);
   void rememberFilm() const;
   void drawFilmPictures();
-  MovieRequest filmMovie(const std::filesystem::path& file, std::vector<double> times) const;
+  MovieRequest filmMovie(std::vector<double> times) const;
   std::optional<double> seriesTime() const;
   bool giveUpTint();
   bool raiseMemory(const TooLittleMemory& error);
@@ -194,7 +209,7 @@ class CacheView {
   /// to notice that it has drawn it.
   bool isRefining() const { return frames_->busy() && !(was_moving_ && isShown()); }
   bool isFinal() const { return isShown() && shown_->is_final && !chooser_.busy(); }
-  void say(const std::string& text) { reports_.say(text); }
+  void say(const std::string& text, About about = About::kNothing) { reports_.say(text, about); }
   /// Describes what the picture that is shown lacks, for a sentence: ", without 3 damaged bricks"; empty if
   /// nothing.
   std::string lacks() const;
@@ -234,7 +249,8 @@ class CacheView {
   bool adds_scalar_ = false;  // one is being added
   std::optional<WantedScalar> wanted_scalar_;
   const bool encodes_movies_;
-  MovieKind movie_kind_ = MovieKind::kOneTurn;  // for which a file is being chosen
+  MovieKind movie_kind_ = MovieKind::kOneTurn;      // for which a file is being chosen
+  std::map<MovieKind, MovieChoice> movie_choices_;  // the last ones; the copied command is of the same movie
   std::optional<MovieRequest> wanted_movie_;
 
   FilmEdit film_;

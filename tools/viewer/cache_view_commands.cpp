@@ -32,9 +32,7 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
   static constexpr CommandAction<View> kActions[] = {
       {Command::kSavePicture, [](View& v) { v.saveTo({}); }},
       {Command::kSavePictureAs,
-       [](View& v) {
-         v.dialog_.openToSavePicture(v.cache_.wholePath().stem().string() + ".png", v.picture_size_);
-       }},
+       [](View& v) { v.dialog_.openToSavePicture(v.name() + ".png", v.picture_size_, v.textSize()); }},
       {Command::kSaveTurnMovie, [](View& v) { v.saveMovieOf(MovieKind::kOneTurn); }},
       {Command::kSaveStepsMovie, [](View& v) { v.saveMovieOf(MovieKind::kAllSteps); }, kHasSteps},
       {Command::kSaveFilmMovie, [](View& v) { v.saveMovieOf(MovieKind::kFilm); }, kHasFilm},
@@ -170,19 +168,6 @@ void CacheView::takeIsosurfaces() {
     found->value = surface.value;
   }
   changed_ = true;
-}
-
-void CacheView::saveMovieOf(MovieKind kind) {
-  movie_kind_ = kind;
-  const MovieRequest movie = newMovie({});
-  FileDialog::MovieOffer offer{movie.size, movie.frames_per_s, {}, encodes_movies_};
-  if (kind == MovieKind::kOneTurn) offer.chosen_frames = framesOf(movie);
-  // The dialog may outlive this view.
-  offer.frames = [film = film_, frames = framesOf(movie), kind](double rate) {
-    return kind == MovieKind::kFilm ? film.frames(rate) : frames;
-  };
-  const char* const ending = encodes_movies_ ? ".mp4" : ".html";
-  dialog_.openToSaveMovie(cache_.wholePath().stem().string() + ending, std::move(offer));
 }
 
 /// Looks as at the beginning, before anything was turned, in this window or in one before it, and flies no more.

@@ -1,5 +1,5 @@
-// The film of a view: its key frames as the panel edits them, playing it, its file, and the small pictures of its key frames,
-// which are drawn in the background.
+// Movies of a view, and pictures of another size than the window's, which are drawn in the background. The film of a view: its key
+// frames as the panel edits them, playing it, its file, and the small pictures of its key frames.
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
@@ -59,8 +59,7 @@ void CacheView::apply(const FilmActions& actions) {
   if (actions.remove) film_.remove();
   if (actions.play) film_.isPlaying() ? film_.stop() : playFilm();
   if (actions.open) dialog_.open(FileDialog::Purpose::kOpenFilm);
-  if (actions.save)
-    dialog_.open(FileDialog::Purpose::kSaveFilm, cache_.wholePath().stem().string() + "_film.json");
+  if (actions.save) dialog_.open(FileDialog::Purpose::kSaveFilm, name() + "_film.json");
   if (actions.move) film_.move(actions.move->first, actions.move->second);
   if (actions.select) film_.goTo(film_.keys()[*actions.select].frame.time);
   if (actions.go_to) film_.goTo(*actions.go_to);
@@ -135,9 +134,85 @@ void CacheView::rememberFilm() const {
   }
 }
 
-MovieRequest CacheView::filmMovie(const std::filesystem::path& file, std::vector<double> times) const {
-  MovieRequest movie{MovieKind::kFilm, file, cache_.at(playback_.position()), stateOfFilm(), picture_size_};
-  movie.frames_per_s = FilmEdit::kFramesPerSecond;
+/// The user's last choice, or the usual one.
+CacheView::MovieChoice CacheView::movieChoice(MovieKind kind) const {
+  const auto chosen = movie_choices_.find(kind);
+  if (chosen != movie_choices_.end()) return chosen->second;
+  return {{}, kind == MovieKind::kAllSteps ? playback_.stepsPerSecond() : kFramesPerSecond};
+}
+
+void CacheView::saveMovieOf(MovieKind kind) {
+  movie_kind_ = kind;
+  const MovieRequest movie = newMovie(kind, movieChoice(kind));
+  FileDialog::MovieOffer offer{picture_size_, movie.size, movie.frames_per_s, {}, encodes_movies_};
+  if (kind == MovieKind::kOneTurn) offer.chosen_frames = framesOf(movie);
+  // The dialog may outlive this view.
+  offer.frames = [film = film_, frames = framesOf(movie), kind](double rate) {
+    return kind == MovieKind::kFilm ? film.frames(rate) : frames;
+  };
+  dialog_.openToSaveMovie(name() + (encodes_movies_ ? ".mp4" : ".html"), std::move(offer));
+}
+
+/// Saves a picture of another size than the window's. What is seen in the window is in it.
+void CacheView::savePictureOf(const std::filesystem::path& file, ImageSize size) {
+  wanted_movie_ = heldMovie(MovieKind::kOnePicture, {size});
+  wanted_movie_->file = file;
+}
+
+/// Saves a movie of what is shown now, whatever is changed while it is drawn.
+void CacheView::saveMovieTo(const FileDialog::Chosen& chosen) {
+  if (movie_kind_ == MovieKind::kFilm && !film_.film()) return;  // its key frames were removed meanwhile
+  MovieChoice choice{chosen.size, chosen.frames_per_s};
+  if (chosen.frames > 0) choice.turn_frames = chosen.frames;
+  if (same(*chosen.size, picture_size_)) choice.size.reset();
+  // The speed of playback may be changed until the next one.
+  if (movie_kind_ != MovieKind::kAllSteps) movie_choices_[movie_kind_] = choice;
+  wanted_movie_ = heldMovie(movie_kind_, choice);
+  wanted_movie_->file = chosen.files.front();
+}
+
+/// The movie of a size: what is seen in the window is in it, and in one once around the data are whole from all sides.
+MovieRequest CacheView::heldMovie(MovieKind kind, const MovieChoice& choice) const {
+  MovieRequest movie = newMovie(kind, choice);
+  const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
+  // Text takes the same part of the picture.
+  movie.state.annotations.text_size *= static_cast<double>(movie.size.height) / picture_size_.height;
+  const ImageSize data = dataSizeOf(movie.state, manifest(), movie.size);
+  movie.state.camera = holding(movie.state.camera, data_size_, data);
+  if (kind == MovieKind::kOneTurn) movie.state.camera = navigation_.onceAround(movie.state.camera, data);
+  movie.magnification = std::min(1.0, aspect(data) / aspect(data_size_));
+  return movie;
+}
+
+/// The movie that a command can draw as the window does: the one that was saved last, but for a film of a narrower size.
+MovieRequest CacheView::copiedMovie(MovieKind kind) const {
+  MovieChoice choice = movieChoice(kind);
+  MovieRequest movie = heldMovie(kind, choice);
+  if (kind != MovieKind::kFilm || movie.magnification == 1) return movie;
+  choice.size.reset();
+  return heldMovie(kind, choice);
+}
+
+MovieRequest CacheView::newMovie(MovieKind kind, const MovieChoice& choice) const {
+  MovieRequest movie{kind, {}, cache_.at(playback_.position()), state_, choice.size.value_or(picture_size_)};
+  if (kind == MovieKind::kFilm) {
+    const uint64_t frames = film_.frames(choice.frames_per_s);
+    std::vector<double> times;
+    for (uint64_t frame = 0; frame < frames; ++frame) times.push_back(film_.film()->timeOf(frame, frames));
+    movie = filmMovie(std::move(times));
+    movie.size = choice.size.value_or(picture_size_);
+  }
+  movie.frames_per_s = choice.frames_per_s;
+  movie.turn_frames = choice.turn_frames;
+  movie.backend = backend_;
+  movie.faces_at = faces_at_;
+  movie.keep_going = !damaged_.empty();
+  if (preview_) movie.keeps = preview_->folder;
+  return movie;
+}
+
+MovieRequest CacheView::filmMovie(std::vector<double> times) const {
+  MovieRequest movie{MovieKind::kFilm, {}, cache_.at(playback_.position()), stateOfFilm(), picture_size_};
   movie.film = film_.film();
   movie.film_times = std::move(times);
   movie.interpolates = playback_.interpolates();
@@ -172,7 +247,7 @@ void CacheView::drawFilmPictures() {
     times.push_back(key.frame.time);
   }
   if (missing.empty()) return;
-  MovieRequest movie = filmMovie("pictures.png", std::move(times));
+  MovieRequest movie = filmMovie(std::move(times));
   movie.size = kPictureSize;
   // They show the width of the picture in the window, or its height.
   movie.magnification = std::max(1.0, data_size_.height / FilmPanel::kShape / std::max(1, data_size_.width));

@@ -122,7 +122,7 @@ void CacheView::probe(const WindowLayout& layout) {
   }
   if (clicked_ && !isSeenAt(*clicked_)) {
     clicked_.reset();  // another point lies under that pixel now
-    say("No marker was set, because the view has changed since the click.");
+    say("No marker was set, because the view has changed since the click.", About::kMarker);
   }
   const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedForSeconds;
   if ((rests || clicked_) && isFinal() && !frames_failed_ && !frames_->busy() &&
@@ -141,7 +141,7 @@ void CacheView::probe(const WindowLayout& layout) {
       if (marker_question_)
         probe_.ask(*marker_question_, true);
       else
-        say("There is nothing at this place.");
+        say("There is nothing at this place.", About::kMarker);
     } else if (pointed && !marker_question_) {
       if (const auto asked = question(pixelAt(*pointed)))
         probe_.ask(*asked);
@@ -171,7 +171,7 @@ void CacheView::probe(const WindowLayout& layout) {
   if (!for_marker) return;
   state_.markers.push_back(marker);
   rests_ = false;
-  say(fmt::format("marker {}: {}", marker.name, probed_));
+  say(fmt::format("marker {}: {}", marker.name, probed_), About::kMarker);
 }
 
 /// Whether what is shown now is seen under the same pixel as when it was clicked.
@@ -234,7 +234,7 @@ void CacheView::savePictureIfFinal() {
   fs::path file = *std::exchange(save_to_, std::nullopt);
   const bool numbered = file.empty();
   for (int number = 1; file.empty() || (numbered && fs::exists(file)); ++number)
-    file = fmt::format("{}_{:04}.png", cache_.wholePath().stem().string(), number);
+    file = fmt::format("{}_{:04}.png", name(), number);
   try {
     const ShownFunctions functions(state_, manifest());
     const AnnotatedScene scene =
@@ -242,7 +242,8 @@ void CacheView::savePictureIfFinal() {
     writeImage(annotated(shown_->image, savedAnnotations(state_), scene), file);
     reports_.settle(About::kSaving);
     say("saved " + fs::absolute(file).string() +
-        (preview_ ? fmt::format(", of the preview ({})", preview_->what) : "") + lacks());
+            (preview_ ? fmt::format(", of the preview ({})", preview_->what) : "") + lacks(),
+        About::kSaving);
   } catch (const Error& error) {
     reports_.report(error, About::kSaving);
   }
@@ -257,59 +258,19 @@ std::string CacheView::timeOption(bool of_film) const {
                       : fmt::format(" --time={} --interpolate", cache_.series().timeAt(at));
 }
 
-/// Saves a picture of another size than the window's: it is drawn in the background. What is seen in the
-/// window is in it.
-void CacheView::savePictureOf(const fs::path& file, ImageSize size) {
-  movie_kind_ = MovieKind::kOnePicture;
-  saveMovieTo(file, size);
-}
-
-/// Saves a movie of what is shown now, whatever is changed while it is drawn. `frames_per_s`: nullopt: as usual; `turn_frames`: 0: as
-/// usual.
-void CacheView::saveMovieTo(const fs::path& file, ImageSize size, std::optional<double> frames_per_s,
-                            uint64_t turn_frames) {
-  if (movie_kind_ == MovieKind::kFilm && !film_.film()) return;  // its key frames were removed meanwhile
-  MovieRequest movie = newMovie(file, frames_per_s);
-  if (turn_frames > 0) movie.turn_frames = turn_frames;
-  const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
-  // Text takes the same part of the picture.
-  movie.state.annotations.text_size *= static_cast<double>(size.height) / picture_size_.height;
-  const ImageSize data = dataSizeOf(movie.state, manifest(), size);
-  movie.size = size;
-  movie.state.camera = holding(movie.state.camera, data_size_, data);
-  movie.magnification = std::min(1.0, aspect(data) / aspect(data_size_));
-  wanted_movie_ = std::move(movie);
-}
-
-MovieRequest CacheView::newMovie(const fs::path& file, std::optional<double> frames_per_s) const {
-  if (movie_kind_ == MovieKind::kFilm) {
-    const double rate = frames_per_s.value_or(FilmEdit::kFramesPerSecond);
-    const uint64_t frames = film_.frames(rate);
-    std::vector<double> times;
-    for (uint64_t frame = 0; frame < frames; ++frame) times.push_back(film_.film()->timeOf(frame, frames));
-    MovieRequest movie = filmMovie(file, std::move(times));
-    movie.frames_per_s = rate;
-    return movie;
-  }
-  MovieRequest movie{movie_kind_, file, cache_.at(playback_.position()), state_, picture_size_};
-  if (movie_kind_ == MovieKind::kAllSteps) movie.frames_per_s = playback_.stepsPerSecond();
-  movie.frames_per_s = frames_per_s.value_or(movie.frames_per_s);
-  movie.backend = backend_;
-  movie.faces_at = faces_at_;
-  movie.keep_going = !damaged_.empty();
-  if (preview_) movie.keeps = preview_->folder;
-  return movie;
-}
-
 void CacheView::copyCommand(MovieKind what) {
   try {
     const bool of_film = what == MovieKind::kFilm;
     if (of_film && !film_.film()) return;  // its key frames were removed meanwhile
-    CommandOptions options{shortPath(preview_ ? preview_->whole : cache_.wholePath()),
-                           picture_size_,
-                           {},
-                           {},
-                           what == MovieKind::kOneTurn};
+    CommandOptions options{shortPath(preview_ ? preview_->whole : cache_.wholePath()), picture_size_, {}, {}};
+    ViewState state = state_;
+    if (what != MovieKind::kOnePicture) {
+      const MovieRequest movie = copiedMovie(what);
+      state = movie.state;
+      options.size = movie.size;
+      options.frames_per_s = movie.frames_per_s;
+      (of_film ? options.film_frames : options.turn_frames) = framesOf(movie);
+    }
     if (!grid_files_.empty() && grid_files_.size() <= kMaxNamedFiles) {
       options.cache = shortPath(grid_files_.front());
       for (size_t n = 1; n < grid_files_.size(); ++n) options.solutions.push_back(shortPath(grid_files_[n]));
@@ -318,20 +279,19 @@ void CacheView::copyCommand(MovieKind what) {
     const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
       if (!needsFile(function)) return;
       // Beside the picture that the command will write.
-      file = fmt::format("{}_{}.json", cache_.wholePath().stem().string(), what);
+      file = fmt::format("{}_{}.json", name(), what);
       writeFileDurably(file, toParaViewPreset(function.definition()));
     };
     if (of_film) {
       // Another name than that of a film that is saved, which may have been changed since.
-      options.film = fmt::format("{}_shown_film.json", cache_.wholePath().stem().string());
-      options.film_frames = film_.frames();
+      options.film = fmt::format("{}_shown_film.json", name());
       writeFileDurably(options.film, film_.film()->toJson());
     } else {
       keep(state_.function, "colours", options.function_file);
     }
     if (state_.opacity_by) keep(state_.opacity_by->function, "opacities", options.opacity_file);
-    const std::string command = renderCommand(of_film ? stateOfFilm() : state_, options) +
-                                timeOption(of_film) + (lacks().empty() ? "" : " --keep-going");
+    const std::string command =
+        renderCommand(state, options) + timeOption(of_film) + (lacks().empty() ? "" : " --keep-going");
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);
@@ -360,14 +320,12 @@ void CacheView::use(const FileDialog::Chosen& chosen) {
         writeFileDurably(file, toParaViewPreset(state_.function.definition()));
         return say(fmt::format("saved colours and opacities to {}", file.string()));
       case FileDialog::Purpose::kSavePicture:
-        if (chosen.size &&
-            !(chosen.size->width == picture_size_.width && chosen.size->height == picture_size_.height))
-          return savePictureOf(file, *chosen.size);
+        if (chosen.size && !same(*chosen.size, picture_size_)) return savePictureOf(file, *chosen.size);
         return saveTo(file);
       case FileDialog::Purpose::kOpenSurface:
         return readSurface(file);
       case FileDialog::Purpose::kSaveMovie:
-        return saveMovieTo(file, *chosen.size, chosen.frames_per_s, chosen.frames);
+        return saveMovieTo(chosen);
       case FileDialog::Purpose::kOpenFilm:
         return openFilm(file);
       case FileDialog::Purpose::kSaveFilm:

@@ -40,8 +40,8 @@ struct MovieRequest {
   CacheReader cache;  // at the time that is shown
   ViewState state;
   ImageSize size;  // of the picture in the window; an .mp4 has the next smaller even one
-  double frames_per_s = 25;
-  uint64_t turn_frames = 90;  // of kOneTurn, as `render --orbit 360` draws
+  double frames_per_s = kFramesPerSecond;
+  uint64_t turn_frames = kTurnFrames;  // of kOneTurn
   Backend backend = Backend::kAutomatic;
   FacesAtStep faces_at = {};               // needed where the state has faces
   bool keep_going = false;                 // past damaged bricks

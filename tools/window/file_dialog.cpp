@@ -120,14 +120,16 @@ void FileDialog::open(Purpose purpose, const std::string& name) {
   name_ = name;
 }
 
-void FileDialog::openToSavePicture(const std::string& name, ImageSize size) {
+void FileDialog::openToSavePicture(const std::string& name, ImageSize size, double text_pixels) {
+  text_pixels_ = text_pixels;
   open(Purpose::kSavePicture, name);
   size_ = offered_size_ = size;
 }
 
 void FileDialog::openToSaveMovie(const std::string& name, MovieOffer offer) {
   open(Purpose::kSaveMovie, name);
-  size_ = offered_size_ = offer.size;
+  size_ = offer.size;
+  offered_size_ = offer.shown;
   movie_ = std::move(offer);
 }
 
@@ -203,6 +205,8 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
                         movie_.has_encoder
                             ? ".mp4 or .gif; .html: a page that plays it; .png: numbered pictures"
                             : ".html: a page that plays it; .png: numbered pictures; .mp4, .gif need ffmpeg");
+  else if (error_.empty() && *purpose_ == Purpose::kSavePicture)
+    ImGui::TextDisabled("%s", textsOf(size_).c_str());
   else
     ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
@@ -219,6 +223,11 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   }
   ImGui::EndPopup();
   return chosen;
+}
+
+/// Describes the texts of a picture: they take the same part of its height, whatever its size.
+std::string FileDialog::textsOf(ImageSize size) const {
+  return fmt::format("texts {:.0f} pixels high", text_pixels_ * size.height / offered_size_.height);
 }
 
 float FileDialog::heightBelow() const {
@@ -264,6 +273,7 @@ void FileDialog::drawSize() {
   number("picture height", size_.height);
   ImGui::TextUnformatted("pixels");
   nameWidget(fmt::format("picture of {} x {}", size_.width, size_.height));
+  if (*purpose_ == Purpose::kSavePicture) nameWidget(textsOf(size_));
   const auto offer = [this](const char* text, ImageSize size) {
     ImGui::SameLine();
     if (ImGui::Button(text)) size_ = size;

@@ -53,7 +53,7 @@ class FileDialog {
   };
   /// Size and rate of a movie, which can be changed.
   struct MovieOffer {
-    ImageSize size{0, 0};
+    ImageSize shown{0, 0}, size{0, 0};  // as the window shows it, and to begin with
     double frames_per_s = 25;
     std::function<uint64_t(double frames_per_s)> frames = {};  // how many pictures it has at that rate
     bool has_encoder = true;                                   // ffmpeg, which .mp4 and .gif need
@@ -72,8 +72,8 @@ class FileDialog {
 
   /// Opens it with the next draw(), in the folder it was in last. `name`: the one that is offered.
   void open(Purpose purpose, const std::string& name = "");
-  /// The same, to save a picture; `size` is offered, and can be changed.
-  void openToSavePicture(const std::string& name, ImageSize size);
+  /// The same, to save a picture; `size` is offered, and can be changed. `text_pixels`: the height of its texts then.
+  void openToSavePicture(const std::string& name, ImageSize size, double text_pixels);
   /// The same, to save a movie.
   void openToSaveMovie(const std::string& name, MovieOffer offer);
   bool isOpen() const { return purpose_.has_value(); }
@@ -85,6 +85,7 @@ class FileDialog {
 
  private:
   void enter(const std::filesystem::path& folder);
+  std::string textsOf(ImageSize size) const;
   float heightBelow() const;
   void drawHelp(bool saves) const;
   void drawEntries(bool& accepts);
@@ -108,6 +109,7 @@ class FileDialog {
   std::string taken_text_;          // them, as they were put into `name_`
   std::string name_, error_, overwrites_;
   ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture or a movie
+  double text_pixels_ = 0;                     // of a picture of the offered size
   MovieOffer movie_;
 };
 
