@@ -98,10 +98,10 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   const EditedFunction automatic = state.function;
   const fs::path& whole = options.preview ? options.preview->whole : cache.cachePath();
   if (options.state) {
-    state = viewStateFromJson(readTextFile(*options.state), *options.state, cache.manifest());
+    state = keptView(readTextFile(*options.state), *options.state, cache.manifest(), picture);
   } else if (const auto remembered = rememberedStateOf(whole); remembered && fs::exists(*remembered)) {
     try {
-      ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, cache.manifest());
+      ViewState found = keptView(readTextFile(*remembered), *remembered, cache.manifest(), picture);
       loadSurfaces(found);
       state = std::move(found);
     } catch (const Error& error) {
