@@ -101,7 +101,7 @@ FunctionParts FirstChoice::constantFunction() const {
   return parts;
 }
 
-FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& maps) const {
+FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& maps, bool with_sheets) const {
   const auto with_map = [&](FunctionParts chosen, const char* preferred) {
     chosen.map = map.empty() ? preferred : map;
     return chosen;
@@ -145,6 +145,7 @@ FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& m
   const auto [begin, end] = seenInterval(*histogram, extinctions);
   const std::optional<FunctionParts> whole = over(begin, end);
   if (!whole) return with_map(constantFunction(), maps.sequential);
+  if (with_sheets) return *whole;
   const auto narrower = narrowedInterval(
       *histogram, seenIn(*histogram, whole->function()), histogram->coordinate(whole->range.first),
       histogram->coordinate(whole->range.second), diverges(begin, end) ? std::optional(zero) : std::nullopt);

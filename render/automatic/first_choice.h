@@ -30,8 +30,10 @@ class FirstChoice {
   FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
               ChosenFor what = ChosenFor::kStep);
 
-  /// Range, opacities and opacity unit; `map`: a preset, or empty to have one of `maps` chosen.
-  FunctionParts function(const std::string& map = "", const DefaultMaps& maps = kMapsOnDark) const;
+  /// Range, opacities and opacity unit; `map`: a preset, or empty to have one of `maps` chosen. `with_sheets`: slices or faces have
+  /// its colours, too, which show values that the volume hides: the range is not narrowed to those that it shows.
+  FunctionParts function(const std::string& map = "", const DefaultMaps& maps = kMapsOnDark,
+                         bool with_sheets = false) const;
   /// The opacity unit at which the function absorbs 65 % on the average over what it shows (seenArea()). Its
   /// own unit does not matter. A function that is transparent for the data gets 1/100 of its diagonal.
   double opacityUnitOf(const TransferFunction& function) const;

@@ -218,6 +218,33 @@ TEST_F(DefaultPictures, DivergingMapsAreCentred) {
   EXPECT_GT(std::abs(middleOf({"--tf", "viridis"})), 0.05);
 }
 
+/// A dense core behind haze takes no colours from what is seen, but where a slice shows it.
+TEST_F(DefaultPictures, ASliceHasColoursForWhatTheVolumeHides) {
+  constexpr int kSide = 24;
+  std::ofstream data(file("core.vtk"));
+  data << fmt::format(
+      "# vtk DataFile Version 3.0\ncore\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS {0} {0} {0}\nORIGIN -1 "
+      "-1 -1\n"
+      "SPACING {1} {1} {1}\nPOINT_DATA {2}\nSCALARS f float 1\nLOOKUP_TABLE default\n",
+      kSide, 2.0 / (kSide - 1), kSide * kSide * kSide);
+  const auto place = [](int n) { return 2.0 * n / (kSide - 1) - 1; };
+  for (int n = 0; n < kSide * kSide * kSide; ++n)
+    data << std::exp(-5 * std::hypot(place(n % kSide), place(n / kSide % kSide), place(n / kSide / kSide)))
+         << '\n';
+  data.close();
+  run({"convert", file("core.vtk"), "-o", file("a.splats")});
+  const auto highest = [&](const Words& options) {
+    for (const std::string& word : chosenOptions(render(options).out)) {
+      double low = 0, high = 0;
+      if (std::sscanf(word.c_str(), "%lf,%lf", &low, &high) == 2 && low > 0) return high;
+    }
+    ADD_FAILURE() << testing::PrintToString(options);
+    return 0.0;
+  };
+  EXPECT_LT(highest({}), 0.4);
+  EXPECT_GT(highest({"--slice", "0,0,0,1,0,0"}), 0.6);
+}
+
 TEST_F(DefaultPictures, AConstantScalarIsNotChosen) {
   run({"generate", "half-annulus-constant", "--size", "24x16x16", "-o", file("a")});
   run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats"), "--scalar", "all", "--scalar",

@@ -174,6 +174,8 @@ void render(const RenderArguments& given) {
   options.scale = verticallyScaled(options.scale, arguments.frame.vertical_scale, globe);
   if (arguments.camera.film)
     arguments.camera.film = std::make_shared<const Film>(arguments.camera.film->inScale(options.scale));
+  arguments.scalar.with_sheets = !arguments.surfaces.slices.empty() || arguments.surfaces.film_has_slices ||
+                                 !arguments.surfaces.surface_by.empty();
   const size_t shown = chooseVariable(cache, arguments.scalar);
   const ChosenFor drawn = drawnSteps(arguments);
   ScalarChoice choice = chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options, drawn);

@@ -431,6 +431,7 @@ void colourByScalar(GridSurface& surface, const std::string& name, const CacheRe
   if (variable == drawn) return;
   ScalarArguments arguments;
   arguments.scalar = name;
+  arguments.with_sheets = true;
   PictureChoice choice(cache, variable, glm::dvec3(1.0), ChosenFor::kStep, maps);
   surface.function = std::make_shared<TransferFunction>(choice.function(arguments));
   surface.colours = std::make_shared<ColourTable>(*surface.function);

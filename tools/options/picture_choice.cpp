@@ -273,7 +273,8 @@ std::string adviceOnConstant(const CacheReader& cache, ChosenFor what) {
 }  // namespace
 
 TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
-  FunctionParts parts = data().function(arguments.transfer_function.value_or(""), maps_);
+  FunctionParts parts =
+      data().function(arguments.transfer_function.value_or(""), maps_, arguments.with_sheets);
   TransferFunctionDefinition definition = parts.definition();
   if (isNearlyConstant(info()))
     definition.notes.push_back(fmt::format("{} is {} everywhere, or nearly so{}", info().name,

@@ -25,6 +25,7 @@ struct ScalarArguments {
   std::string scalar;
   std::optional<std::string> transfer_function, range, opacity, asinh, opacity_unit;
   std::optional<TransferFunctionDefinition> film = std::nullopt;  // a film's first, in place of these
+  bool with_sheets = false;   // that have its colours: FirstChoice::function()'s
   const char* prefix = "--";  // of --tf, --range and --asinh; "--opacity-" of those of the opacities' scalar
 };
 

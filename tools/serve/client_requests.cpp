@@ -154,8 +154,8 @@ ViewRequest viewIn(const JsonField& message) {
 }
 
 FunctionRequest functionIn(const JsonField& message) {
-  const auto dark = message.find("dark");
-  return {cacheIn(message), nameIn(message, "scalar"), !dark || dark->flag()};
+  const auto dark = message.find("dark"), sheets = message.find("sheets");
+  return {cacheIn(message), nameIn(message, "scalar"), !dark || dark->flag(), sheets && sheets->flag()};
 }
 
 HistogramRequest histogramIn(const JsonField& message) {

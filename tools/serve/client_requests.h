@@ -14,7 +14,8 @@
 //    "size": [800, 600], "moving": true,         step that is wanted after this one; "saves": true draws markers, too
 //    "step": 0, "next": 1, "state": {...}}
 //   {"type": "choose", "cache": 0,               asks for the automatic function of a scalar on a dark or
-//    "scalar": "density", "dark": true}          a white background
+//    "scalar": "density", "dark": true,          a white background; "sheets": slices have its colours, too
+//    "sheets": false}
 //   {"type": "histogram", "cache": 0,            asks for a scalar's histogram
 //    "scalar": "density", "low": 0, "high": 1,
 //    "log": false}
@@ -99,7 +100,8 @@ struct ViewRequest {
 struct FunctionRequest {
   size_t cache = 0;
   std::string scalar;
-  bool dark = true;  // the background
+  bool dark = true;          // the background
+  bool with_sheets = false;  // slices or faces have its colours
 };
 struct HistogramRequest {
   size_t cache = 0;

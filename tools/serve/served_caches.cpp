@@ -188,7 +188,7 @@ std::string ServedCaches::functionText(const FunctionRequest& request) const {
   variableOf(cache.reader, cache.name, request.scalar);
   const MutexLock lock(reading_);
   Json json = {{"type", "function"}, {"cache", request.cache}, {"scalar", request.scalar}};
-  EditedFunction function = automaticFunction(cache.reader, request.scalar);
+  EditedFunction function = automaticFunction(cache.reader, request.scalar, request.with_sheets);
   function.suitBackground(request.dark);
   addFunction(json, function);
   return textOf(json);

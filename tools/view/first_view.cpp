@@ -37,8 +37,8 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
   return state;
 }
 
-EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar) {
-  return EditedFunction::automatic(choiceOf(cache, scalar).function());
+EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar, bool with_sheets) {
+  return EditedFunction::automatic(choiceOf(cache, scalar).function("", kMapsOnDark, with_sheets));
 }
 
 double middleOfSeen(const std::vector<double>& histogram, const EditedFunction& function, double share) {
@@ -92,21 +92,20 @@ EditedFunction chosenAnew(const EditedFunction& before, EditedFunction automatic
 
 void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name) {
   // First: where reading fails, the state stays as it was.
-  EditedFunction chosen = chosenAnew(state.function, automaticFunction(cache, name));
+  EditedFunction chosen = chosenAnew(state.function, automaticFunction(cache, name, state.coloursSheets()));
   chooseVariable(state, cache.manifest(), name);
   state.function = std::move(chosen);
   state.suitBackground();
 }
 
 void FunctionChooser::ask(const Question& question) {
-  wanted(question.what) = question.scalar;
+  wanted(question.what) = question;
   if (!answering_.valid()) beginNext();
 }
 
 void FunctionChooser::takeQuestionsOf(FunctionChooser& other) {
-  for (size_t what = 0; what < wanted_.size(); ++what)
-    if (const auto scalar = std::exchange(other.wanted_[what], std::nullopt))
-      ask({static_cast<For>(what), *scalar});
+  for (std::optional<Question>& wanted : other.wanted_)
+    if (const auto question = std::exchange(wanted, std::nullopt)) ask(*question);
 }
 
 void FunctionChooser::drop() {
@@ -114,21 +113,21 @@ void FunctionChooser::drop() {
 }
 
 bool FunctionChooser::busy() const {
-  return std::ranges::any_of(wanted_, [](const auto& scalar) { return scalar.has_value(); });
+  return std::ranges::any_of(wanted_, [](const auto& wanted) { return wanted.has_value(); });
 }
 
 void FunctionChooser::beginNext() {
-  const auto next = std::ranges::find_if(wanted_, [](const auto& scalar) { return scalar.has_value(); });
+  const auto next = std::ranges::find_if(wanted_, [](const auto& wanted) { return wanted.has_value(); });
   if (next == wanted_.end()) return;
-  question_ = {static_cast<For>(next - wanted_.begin()), **next};
+  question_ = **next;
   try {
-    answering_ = std::async(std::launch::async, [&cache = cache_, wake = wake_, scalar = question_.scalar] {
+    answering_ = std::async(std::launch::async, [&cache = cache_, wake = wake_, question = question_] {
       nameThisThread("function");
       struct WakeAtEnd {
         void (*call)();
         ~WakeAtEnd() { call(); }
       } const at_the_end{wake};
-      return automaticFunction(cache, scalar);
+      return automaticFunction(cache, question.scalar, question.with_sheets);
     });
   } catch (...) {  // there is no thread to be had
     next->reset();
@@ -142,7 +141,7 @@ std::optional<FunctionChooser::Answer> FunctionChooser::poll() {
     return std::nullopt;
   std::future<EditedFunction> answered = std::move(answering_);
   const Question question = question_;
-  const bool is_wanted = answered.valid() && isWanted(question);
+  const bool is_wanted = answered.valid() && wanted(question.what) == question;
   if (is_wanted) drop(question.what);
   beginNext();
   if (!is_wanted) return std::nullopt;

@@ -20,8 +20,8 @@ namespace curvisplat {
 /// varies. Throws UsageError if there is no such scalar, and Error as reading does.
 ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, ImageSize picture);
 
-/// The function that is chosen from the data for a scalar.
-EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar);
+/// The function that is chosen from the data for a scalar. `with_sheets`: as FirstChoice::function() has it.
+EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar, bool with_sheets);
 
 /// The scalar that divides what a function shows into halves, or has a `share` of it below: of the volume, each part times its
 /// opacity. Where all is transparent it divides the volume, and without any volume the range. `histogram`: as of histogramOf().
@@ -53,6 +53,7 @@ class FunctionChooser {
   struct Question {
     For what = For::kScalar;
     std::string scalar;
+    bool with_sheets = false;  // FirstChoice::function()'s
     bool operator==(const Question&) const = default;
   };
   struct Answer {
@@ -73,15 +74,13 @@ class FunctionChooser {
   bool busy() const;
 
  private:
-  std::optional<std::string>& wanted(For what) { return wanted_[static_cast<size_t>(what)]; }
-  bool isWanted(const Question& question) { return wanted(question.what) == question.scalar; }
+  std::optional<Question>& wanted(For what) { return wanted_[static_cast<size_t>(what)]; }
   void beginNext();
 
   const CacheReader& cache_;
   void (*const wake_)();
-  std::array<std::optional<std::string>, kPurposes>
-      wanted_;         // for each purpose, the scalar of the answer that is to come
-  Question question_;  // that is being answered
+  std::array<std::optional<Question>, kPurposes> wanted_;  // for each purpose, whose answer is to come
+  Question question_;                                      // that is being answered
   std::future<EditedFunction> answering_;
 };
 

@@ -345,6 +345,11 @@ bool ViewState::hasSheets() const {
          has_visible(slices);
 }
 
+bool ViewState::coloursSheets() const {
+  const bool has_faces = faces_by && std::ranges::any_of(faces, &NamedFaces::visible);
+  return has_faces || std::ranges::any_of(slices, &ListedPlane::visible);
+}
+
 SheetOpacity ViewState::opacityOf(const NamedFaces& named) const {
   return {named.opacity.factor, named.opacity.by_function && (faces_by || opacity_by)};
 }

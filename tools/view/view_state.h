@@ -145,6 +145,8 @@ struct ViewState {
   std::vector<std::vector<Isosurface>> drawnIsosurfaces() const;
   /// Whether anything but the volume is drawn, or would be without it.
   bool hasSheets() const;
+  /// Whether slices or faces have the colours of the scalar's function.
+  bool coloursSheets() const;
   /// Whether the volume is drawn: always if there is nothing else, whatever `volume` says.
   bool drawsVolume() const { return volume || !hasSheets(); }
   /// The direction towards the light, where lit; nullopt: the viewer. Shadows need a direction.

@@ -91,6 +91,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
   startFrames(std::move(after));
   playback_.goTo(cache_.step());
   setBounds();
+  if (options.carried) chooseForSheets();
   if (!prepared.film) return;
   reports_.attempt([&] { takeFilm(*prepared.film); });
   kept_film_ = film_.film();
@@ -148,7 +149,7 @@ ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOption
   if (!is_other && !state.function.isAutomatic()) return state;
   state.function = chosenAnew(state.function, state.variable == prepared.scalar
                                                   ? prepared.automatic
-                                                  : automaticFunction(cache_, state.variable));
+                                                  : automaticFunction(cache_, state.variable, false));
   state.suitBackground();
   return state;
 }
@@ -385,10 +386,10 @@ void CacheView::apply(const PanelActions& actions) {
   if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
   if (actions.automatic_function) run(Command::kResetFunction);
   if (actions.automatic_opacities)
-    chooser_.ask(
-        state_.opacity_by
-            ? FunctionChooser::Question{FunctionChooser::For::kOpacities, state_.opacity_by->variable}
-            : FunctionChooser::Question{FunctionChooser::For::kSameColours, state_.variable});
+    chooser_.ask(state_.opacity_by ? FunctionChooser::Question{FunctionChooser::For::kOpacities,
+                                                               state_.opacity_by->variable}
+                                   : FunctionChooser::Question{FunctionChooser::For::kSameColours,
+                                                               state_.variable, state_.coloursSheets()});
   if (actions.add_faces) addFaces(*actions.add_faces);
   // What is saved has no tint.
   const bool tints = !save_to_ && !actions.add_faces && !not_tinted_.contains(actions.pointed_faces);

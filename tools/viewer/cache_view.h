@@ -130,6 +130,7 @@ class CacheView {
   void copyLater(MovieKind what) { copy_requested_ = what; }
   void moveCamera(Command command);
   void lookAsAtFirst();
+  void chooseForSheets();
 
   ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
   void setBounds();

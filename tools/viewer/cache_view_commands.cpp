@@ -49,7 +49,7 @@ std::span<const CommandAction<CacheView>> CacheView::actions() {
        [](const View& v) { return v.history_.canRedo(); }},
       {Command::kResetFunction,
        [](View& v) {
-         v.chooser_.ask({FunctionChooser::For::kSameScalar, v.state_.variable});
+         v.chooser_.ask({FunctionChooser::For::kSameScalar, v.state_.variable, v.state_.coloursSheets()});
        }},
       {Command::kSaveView, [](View& v) { v.saveView(fmt::format("view {}", v.views_.size() + 1)); }},
       {Command::kFirstView, [](View& v) { v.lookAsAtFirst(); }},
@@ -138,7 +138,14 @@ void CacheView::goToStep(const std::function<bool(Playback&)>& move) {
 
 void CacheView::addPlaneTo(std::vector<ListedPlane>& planes) {
   planes.push_back({planeBeforeViewer(manifest(), state_)});
+  chooseForSheets();
   changed_ = true;
+}
+
+/// Slices and faces show values that the volume hides: a function that is chosen from the data gets colours for them.
+void CacheView::chooseForSheets() {
+  if (state_.coloursSheets() && state_.function.isAutomatic())
+    chooser_.ask({FunctionChooser::For::kSameScalar, state_.variable, true});
 }
 
 /// Finds a value of a scalar whose isosurface lies in what is seen, on another thread: it reads the histogram.

@@ -406,7 +406,7 @@ void CacheView::chooseScalar(const std::string& name) {
     return;
   }
   const bool is_shown = name == state_.variable;
-  if (!is_shown) return chooser_.ask({For::kScalar, name});
+  if (!is_shown) return chooser_.ask({For::kScalar, name, state_.coloursSheets()});
   chooser_.drop(For::kScalar);  // one that was chosen before
 }
 
@@ -448,7 +448,7 @@ void CacheView::addFaces(const std::string& name) {
 /// An empty name: each has its own colour.
 void CacheView::colourFaces(const std::string& scalar) {
   chooser_.drop(FunctionChooser::For::kFaces);
-  if (!scalar.empty()) return chooser_.ask({FunctionChooser::For::kFaces, scalar});
+  if (!scalar.empty()) return chooser_.ask({FunctionChooser::For::kFaces, scalar, true});
   state_.faces_by.reset();
   ++function_version_;
   changed_ = true;
@@ -496,6 +496,7 @@ void CacheView::takeFunction() {
       break;
     case FunctionChooser::For::kFaces:
       state_.faces_by = FacesScalar{question.scalar, function};
+      if (question.scalar == state_.variable) chooseForSheets();
       break;
     case FunctionChooser::For::kSameScalar:
       if (question.scalar == state_.variable) state_.function = function;

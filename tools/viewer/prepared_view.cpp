@@ -30,7 +30,7 @@ void takeScene(const ViewerOptions& options, const CacheReader& cache, ViewState
         {options.face_names.at(n), scene.grid_surfaces[n].colour, scene.grid_surfaces[n].opacity});
   state.faces_by.reset();
   if (!options.faces_by.empty())
-    state.faces_by = FacesScalar{options.faces_by, automaticFunction(cache, options.faces_by)};
+    state.faces_by = FacesScalar{options.faces_by, automaticFunction(cache, options.faces_by, true)};
   state.isosurfaces.clear();
   for (const IsoGroup& group : isoGroups(scene, {cache.variableNamed(state.opacityScalar())}))
     for (size_t n = 0; n < group.values.size(); ++n)
@@ -111,6 +111,8 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   if (options.scalar && *options.scalar != state.variable) chooseVariable(state, cache, *options.scalar);
   if (options.memory_bytes) state.memory_bytes = *options.memory_bytes;
   if (options.scene) takeScene(options, cache, state);
+  if (options.scene && state.coloursSheets() && state.function.isAutomatic())
+    state.function = automaticFunction(cache, state.variable, true);
   loadSurfaces(state);
   removeMissingFaces(options.faces, cache, state);
   if (options.camera) {
