@@ -133,6 +133,7 @@ def copies_the_command(tab, caches, edited, colours=None):
     # Numbers of the command have six digits.
     differing = differing_from(tab, pathlib.Path(caches[0]).parent / "picture.png", by=3)
     expect(isinstance(differing, int) and differing < 200, f"the command draws the page's picture: {differing} bytes differ: {text}")
+    return text
 
 
 def is_the_commands_picture(tab, server_caches):
@@ -164,6 +165,8 @@ def navigation(browser, server, caches):
     expect("waiting for the first picture" in tab.run(waiting), "a page without a picture says that it waits")
     tab.run("document.getElementById('stage').className = 'drawn'")
     is_the_commands_picture(tab, caches)
+    below = tab.run("['save', 'copy-command', 'copy-address'].filter(id => document.getElementById(id).getBoundingClientRect().bottom > innerHeight)")
+    expect(not below, f"what saves and copies is in view: {below}")
     first = tab.run(f"{PAGE}.state.camera")
     tab.run("document.getElementById('picture').focus()")
     changes(tab, lambda: tab.key("o"), "the key o")
@@ -320,10 +323,10 @@ def numbers(tab):
     for low, high, log, expected in ((-2, 6, False, ["-2", "0", "2", "4", "6"]), (0.01, 100, True, ["0.01", "0.1", "1", "10", "100"]),
                                      (101325, 101327, False, ["101325", "101325.5", "101326", "101326.5", "101327"]),
                                      (-3e-9, 1e-9, False, ["-3e-9", "-2e-9", "-1e-9", "0", "1e-9"])):
-        tab.run(f"setRange({low}, {high}, {'true' if log else 'false'})")
+        tab.run(f"setRange({low}, {high}, {'true' if log else 'false'}, null)")
         shown = tab.run("[0, 0.25, 0.5, 0.75, 1].map(numberAt)")
         expect(shown == expected, f"{low} to {high}: {shown}")
-        tab.run("setRange(0.5, 1, false)")
+        tab.run("setRange(0.5, 1, false, null)")
     choose_automatic(tab)
 
 
@@ -404,6 +407,33 @@ def editing(tab):
     typed_numbers(tab)
     rest(tab)
     expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
+
+
+def asinh_scale(tab, caches):
+    """A function in asinh is edited by its own few points, on its own scale, and the command states them."""
+    rest(tab)
+    tab.run("(() => { const [low, high] = range(), size = high - low; setRange(low, high, false, [low + 0.1 * size, 0.05 * size]); "
+            "askColours(state.parts.map); })()")
+    tab.wait("state.function.RGBPoints.length === 4 * 257", "the colours on that scale")
+    expect(not tab.run("document.getElementById('asinh').hidden"), "the scale is named")
+    changes(tab, lambda: tab.click("#band"), "a band in asinh", "asinh_band")
+    expect(tab.run("points().map(p => p.u)") == [0, 0.4, 0.5, 0.6, 1], f"it has the band's points: {tab.run('points()')}")
+    low, high = tab.run("range()")
+    expect(abs(tab.run("toUnit(fromUnit(0.3))") - 0.3) < 1e-9 and tab.run("fromUnit(0.5)") < low + 0.3 * (high - low), "values near the centre have more space")
+    tab.wait("histogram && histogram.asinh", "the histogram in asinh")
+    x, y = tab.place("#curve")
+    changes(tab, lambda: tab.drag((x - 100, y - 20), (x - 100, y - 40), steps=5, pause_s=0.03), "a new point in asinh")
+    expect(tab.run("points().length") == 6, "a click adds one point")
+    tab.click("#band")
+    text = copies_the_command(tab, caches, edited=False, colours=tab.run("state.parts.map"))
+    expect("--asinh" in text and "0:0,0.4:0,0.5:0.5,0.6:0,1:0" in text, f"the command has the scale and the points: {text}")
+    set_value(tab, "#low", repr(low + 0.05 * (high - low)))
+    rest(tab)
+    expect(tab.run("asinhOf() !== null && points().length") == 5, "another range keeps the scale")
+    press(tab, "#ramp")
+    tab.wait("asinhOf() === null && state.function.RGBPoints.length < 4 * 257", "a ramp on the map's own scale")
+    choose_automatic(tab)
+    rest(tab)
 
 
 def saves_pictures(tab):
@@ -933,12 +963,13 @@ with tempfile.TemporaryDirectory() as folder:
             choose_map(tab, "viridis")
             tab.wait("document.getElementById('map').textContent === 'viridis'", "the colours")
             copies_the_command(tab, caches, edited=False, colours="viridis")
-            tab.run("setRange(...range(), false)")  # on a linear scale from now on
+            tab.run("setRange(...range(), false, null)")  # on a linear scale from now on
             choose_map(tab, "magma")
             tab.wait("document.getElementById('map').textContent === 'magma'", "the colours")
             tab.run("setPoints([[0, 0.2], [0.3, 0.9], [1, 0.1]].map(([u, opacity]) => ({ u, opacity, midpoint: 0.5, sharpness: 0 }))); changed()")
             copies_the_command(tab, caches, edited=False, colours="magma")
             choose_automatic(tab)
+            asinh_scale(tab, caches)
             saves_pictures(tab)
             print("command done")
             markers(tab)

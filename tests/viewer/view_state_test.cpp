@@ -243,6 +243,27 @@ TEST(ViewState, AnAutomaticFunctionComesBackWithItsScale) {
   }
 }
 
+/// The page edits the few points of an asinh function, and sends its curve in short lines that pass by the points' corners.
+TEST(ViewState, APointOfAnAsinhFunctionIsEditedAsOne) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  FunctionParts parts{"inferno", {0.5, 3}, AsinhScale{1, 0.25}, {{0, 0.5}, {0.25, 0}, {1, 0.75}}, 0.5};
+  state.function = EditedFunction::automatic(parts);
+  auto json = nlohmann::ordered_json::parse(toJson(state));
+  parts.opacities = {{0, 0.5}, {0.3337, 0.2}, {1, 0.75}};
+  const EditedFunction edited(parts);
+  json["parts"] = jsonOf(parts);
+  json["function"] = nlohmann::ordered_json::parse(toParaViewPreset(edited.definition())).front();
+  for (auto& number : json["function"]["Points"]) number = static_cast<double>(static_cast<float>(number));
+  json["preset"] = "";
+  const ViewState read = viewStateFromJson(json.dump(), "test", manifest());
+  ASSERT_TRUE(read.function.parts());
+  EXPECT_EQ(textOf(read.function.parts()->opacities), textOf(parts.opacities));
+  // Whoever changes the curve alone need not know of the parts.
+  json["parts"]["opacities"] = "0:0,1:1";
+  const ViewState other = viewStateFromJson(json.dump(), "test", manifest());
+  EXPECT_NEAR(other.function.function().at(2).extinction, edited.function().at(2).extinction, 1e-3);
+}
+
 TEST(ViewState, ATitleComesBackAndALongOneIsCutBetweenLetters) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   EXPECT_FALSE(state.annotations.texts);

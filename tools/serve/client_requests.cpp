@@ -164,6 +164,11 @@ HistogramRequest histogramIn(const JsonField& message) {
   const double width = histogram.high - histogram.low;
   if (!(width > 0 && width < 1e300)) message.at("high").fail("more than low");
   if (histogram.log && !(histogram.low > 0)) message.at("low").fail("a number above zero");
+  if (const auto asinh = message.find("asinh"); asinh && !histogram.log) {
+    const std::vector<JsonField> both = asinh->elements(2);
+    if (both.size() != 2) asinh->fail("centre and width");
+    histogram.asinh = AsinhScale{both[0].number(-1e300, 1e300), both[1].number(1e-300, 1e300)};
+  }
   return histogram;
 }
 

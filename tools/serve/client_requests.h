@@ -18,7 +18,7 @@
 //    "sheets": false}
 //   {"type": "histogram", "cache": 0,            asks for a scalar's histogram
 //    "scalar": "density", "low": 0, "high": 1,
-//    "log": false}
+//    "log": false, "asinh": [0.5, 0.1]}          along its range; in asinh: centre and width
 //   {"type": "colours", "map": "viridis",        asks for a colour map's points; with `parts`, as ViewState's
 //    "parts": {...}}                             JSON has those of a function: along its range
 //   {"type": "isosurface", "cache": 0,           asks for the value at which an isosurface begins
@@ -108,6 +108,7 @@ struct HistogramRequest {
   std::string scalar;
   double low = 0, high = 1;  // low < high, and above 0 if `log`
   bool log = false;
+  std::optional<AsinhScale> asinh = std::nullopt;  // not with `log`
 };
 struct ColoursRequest {
   std::string map;

@@ -200,8 +200,10 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
   const MutexLock lock(reading_);
   Json json = {{"type", "histogram"}, {"cache", request.cache}, {"scalar", request.scalar},
                {"low", request.low},  {"high", request.high},   {"log", request.log}};
-  EditedFunction function(kMapsOnDark.sequential, request.low, request.high, 1);
+  EditedFunction function(
+      FunctionParts{.range = {request.low, request.high}, .asinh = request.asinh, .opacities = {}});
   function.setLogScale(request.log);
+  json["asinh"] = request.asinh ? Json{request.asinh->centre, request.asinh->width} : Json(nullptr);
   json["bins"] = histogramOf(cache.reader, variable, function, kBins);
   json["percentiles"] = nullptr;  // of 1 and 99 % of the volume
   if (const auto stored = stepHistogram(cache.reader, variable))

@@ -78,11 +78,12 @@ std::optional<FunctionParts> partsOfPoints(const TransferFunctionDefinition& poi
   const double span = range.second - range.first;
   if (!(span > 0)) return std::nullopt;
   std::vector<FunctionParts> tried;
+  if (like && like->asinh && like->range == range) tried.push_back(*like);  // with its few points
   if (like) tried.push_back({like->map, range, like->asinh, {}, opacity_unit});
   tried.push_back({points.name, range, std::nullopt, {}, opacity_unit});
   for (FunctionParts& parts : tried) try {
       if (!haveSameColours(parts.definition(), points, span)) continue;
-      parts.opacities = opacitiesAlong(parts, points.opacities);
+      if (parts.opacities.empty()) parts.opacities = opacitiesAlong(parts, points.opacities);
       if (points.opacity_unit > 0) parts.opacity_unit = points.opacity_unit;
       if (haveSameOpacities(parts.definition(), points)) return parts;
     } catch (const UsageError&) {  // there is no map of this name
