@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
 """Tests tools/cmake/unity_groups.py: which names a source declares, and which sources it puts together."""
+import contextlib
+import io
 import pathlib
 import re
 import sys
@@ -92,6 +94,12 @@ class UnityGroups(unittest.TestCase):
         texts = [f"int f{n}() {{" for n in range(12)]
         self.assertEqual(unity_groups.groups(texts, 10), [0] * 6 + [1] * 6)
         self.assertEqual(unity_groups.groups([], 10), [])
+
+    def test_targets_are_apart(self):
+        source, output = str(pathlib.Path(__file__).resolve().parents[2] / "tools/main.cpp"), io.StringIO()
+        with contextlib.redirect_stdout(output):
+            unity_groups.main("10", source, source, "--", "10", source)
+        self.assertEqual(output.getvalue().split(), ["0", "1", "0"])
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/unity_groups.py)
 
+# Adds a target's sources to the words for unity_groups.py, and to the list of TARGET|SOURCE that the groups are of.
 function(curvisplat_together target count)
   get_target_property(all ${target} SOURCES)
   get_target_property(folder ${target} SOURCE_DIR)
@@ -21,17 +22,12 @@ function(curvisplat_together target count)
       list(APPEND sources ${source})
     endif()
   endforeach()
-  if(NOT sources)
-    return()
+  if(sources)
+    set_property(GLOBAL APPEND PROPERTY curvisplat_unity_words -- ${count} ${sources})
+    list(TRANSFORM sources PREPEND "${target}|")
+    set_property(GLOBAL APPEND PROPERTY curvisplat_unity_sources ${sources})
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
   endif()
-  execute_process(
-    COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tools/cmake/unity_groups.py ${count} ${sources}
-    OUTPUT_VARIABLE groups OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
-  string(REPLACE "\n" ";" groups "${groups}")
-  foreach(source group IN ZIP_LISTS sources groups)
-    set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES UNITY_GROUP group_${group})
-  endforeach()
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 endfunction()
 
 # Those targets in a folder that are of these types, `count` sources at a time.
@@ -57,4 +53,16 @@ foreach(folder ${folders})
   else()
     curvisplat_together_in(${folder} "EXECUTABLE;STATIC_LIBRARY;OBJECT_LIBRARY;MODULE_LIBRARY" 10)
   endif()
+endforeach()
+# All at once: a start of Python for each target took most of the time of configuring.
+get_property(words GLOBAL PROPERTY curvisplat_unity_words)
+get_property(sources GLOBAL PROPERTY curvisplat_unity_sources)
+execute_process(
+  COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tools/cmake/unity_groups.py ${words}
+  OUTPUT_VARIABLE groups OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+string(REPLACE "\n" ";" groups "${groups}")
+foreach(both group IN ZIP_LISTS sources groups)
+  string(REPLACE "|" ";" both "${both}")
+  list(POP_FRONT both target source)
+  set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES UNITY_GROUP group_${group})
 endforeach()

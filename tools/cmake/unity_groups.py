@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Which sources can be compiled together, as one that includes them (tools/cmake/unity.cmake, tools/check_clang.py).
 
-    unity_groups.py SIZE FILE ...    prints the number of each file's group, one a line
+    unity_groups.py SIZE FILE ... [-- SIZE FILE ...]    prints the number of each file's group, one a line
 
-A group has at most SIZE files. None of them declares a name for itself that another one declares, too, or that a header declares
-which another one includes (a type or constant; in headers of the tests any name): a static function, or one in a namespace without name, say.
-What is declared is read from the layout: our formatter puts declarations of a namespace at the beginning of a line, and nothing
+Each `--` begins the files of another target. A group has at most SIZE files. None of them declares a name for itself that another one
+declares, too, or that a header declares which another one includes (a type or constant; in headers of the tests any name): a static
+function, or one in a namespace without name, say. What is declared is read from the layout: our formatter puts declarations of a namespace at the beginning of a line, and nothing
 else."""
 import functools
+import itertools
 import pathlib
 import re
 import sys
@@ -76,9 +77,11 @@ def groups(texts, size):
     return numbers
 
 
-def main(size, *files):
-    for number in groups([pathlib.Path(file).read_text(encoding="utf-8") for file in files], int(size)):
-        print(number)
+def main(*words):
+    for are_between, target in itertools.groupby(words, "--".__eq__):
+        if not are_between:
+            size, *files = target
+            print(*groups([pathlib.Path(file).read_text(encoding="utf-8") for file in files], int(size)), sep="\n")
 
 
 if __name__ == "__main__":
