@@ -33,9 +33,10 @@ int FaultySystemCalls::fail() {
   return -1;
 }
 
+/// One transfer in nine, since a yield takes milliseconds where others want to run.
 void FaultySystemCalls::dawdle() {
   if (!is_slow) return;
-  for (int64_t n = transfers_++ * 2654435761 % 97; n >= 0; --n) std::this_thread::yield();
+  for (int64_t n = transfers_++ * 2654435761 % 97 - 85; n > 0; --n) std::this_thread::yield();
 }
 
 /// Cuts the file off if it is this one's turn.

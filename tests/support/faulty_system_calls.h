@@ -31,7 +31,7 @@ class FaultySystemCalls : public SystemCalls {
   int error = ENOSPC;
   bool refuse_direct_open = false;   // O_DIRECT is EINVAL, as on file systems that lack it
   bool refuse_direct_reads = false;  // only reading is
-  bool is_slow = false;              // every transfer lets others run first, some of them long
+  bool is_slow = false;              // some transfers let others run first, a few of them long
   bool is_unsynced = false;          // syncing does nothing: no test pulls the plug, and it takes its time
 
   std::atomic<int64_t> calls = 0, reads = 0, writes = 0, syncs = 0, renames = 0;
