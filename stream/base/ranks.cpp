@@ -20,11 +20,13 @@ void Messages::begin(std::span<const uint64_t> bytes) {
 
 /// MPI's own waits keep a core busy, which others may need for their work.
 void Ranks::wait() {
+  // On a machine with much other work each try takes as long as the others' turns: 1000 took over 20 s.
   constexpr int kEagerTries = 1000;
+  const auto eager_end = std::chrono::steady_clock::now() + std::chrono::milliseconds(20);
   constexpr auto kShortest = std::chrono::microseconds(20), kLongest = std::chrono::microseconds(2000);
   auto pause = kShortest;
   for (int tries = 0; !transport_->isDone(); ++tries) {
-    if (tries < kEagerTries) {
+    if (tries < kEagerTries && std::chrono::steady_clock::now() < eager_end) {
       std::this_thread::yield();
       continue;
     }
