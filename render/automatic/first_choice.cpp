@@ -23,6 +23,9 @@ namespace {
 
 constexpr double kConstant = 1e-4;
 constexpr double kMeanDepth = 1.05;  // over what is seen: an absorption of 65 %
+// The mean depth that values have at least which would be clear: of materials, and of what surrounds that which is seen in less than
+// kContext of the silhouette.
+constexpr double kMaterialsDepth = 0.6, kTwoMaterialsDepth = 0.3, kContextDepth = 0.15, kContext = 0.6;
 constexpr double kDivergingShare = 0.25;
 constexpr int kRangeDigits = 3, kUnitDigits = 3;
 
@@ -52,14 +55,6 @@ bool isNearlyConstant(const VariableInfo& variable) {
 
 namespace {
 
-/// Numbers of points, cells and blocks, as VTK and ParaView keep them beside the fields.
-bool isNumbering(const VariableInfo& variable) {
-  constexpr std::string_view kNames[] = {"GlobalNodeId",        "GlobalElementId",    "PedigreeNodeId",
-                                         "PedigreeElementId",   "ObjectId",           "GlobalIds",
-                                         "vtkOriginalPointIds", "vtkOriginalCellIds", "vtkCompositeIndex"};
-  return std::find(std::begin(kNames), std::end(kNames), variable.name) != std::end(kNames);
-}
-
 /// Whether the component varies by no more than rounding errors of the vector's or tensor's largest component.
 bool isNoise(const VariableInfo& component, std::span<const VariableInfo> variables) {
   constexpr double kRounding = 1e-6;
@@ -75,11 +70,15 @@ bool isNoise(const VariableInfo& component, std::span<const VariableInfo> variab
 
 size_t firstVaryingVariable(const Manifest& manifest) {
   std::optional<size_t> first;
+  ScalarKind best{};
   for (size_t n = 0; n < manifest.variables.size(); ++n) {
     const VariableInfo& variable = manifest.variables[n];
     if (isNearlyConstant(variable)) continue;
-    if (!isNumbering(variable) && !isNoise(variable, manifest.variables)) return n;
-    if (!first) first = n;
+    const ScalarKind kind =
+        isNoise(variable, manifest.variables) ? ScalarKind::kNumbering : kindOf(variable.name);
+    if (first && kind >= best) continue;
+    first = n;
+    best = kind;
   }
   return first.value_or(0);
 }
@@ -142,14 +141,32 @@ FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& m
     parts.opacity_unit = opacityUnitOf(parts.function());
     return parts;
   };
+  if (const size_t values = fillingValues(*histogram); values > 1)
+    if (const auto all = over(histogram->low, histogram->high))
+      return inHaze(values > 2 ? kMaterialsDepth : kTwoMaterialsDepth, *all);
   const auto [begin, end] = seenInterval(*histogram, extinctions);
   const std::optional<FunctionParts> whole = over(begin, end);
   if (!whole) return with_map(constantFunction(), maps.sequential);
-  if (with_sheets) return *whole;
-  const auto narrower = narrowedInterval(
-      *histogram, seenIn(*histogram, whole->function()), histogram->coordinate(whole->range.first),
-      histogram->coordinate(whole->range.second), diverges(begin, end) ? std::optional(zero) : std::nullopt);
-  return narrower ? over(narrower->first, narrower->second).value_or(*whole) : *whole;
+  const auto narrower = with_sheets
+                            ? std::nullopt
+                            : narrowedInterval(*histogram, seenIn(*histogram, whole->function()),
+                                               histogram->coordinate(whole->range.first),
+                                               histogram->coordinate(whole->range.second),
+                                               diverges(begin, end) ? std::optional(zero) : std::nullopt);
+  const FunctionParts parts = narrower ? over(narrower->first, narrower->second).value_or(*whole) : *whole;
+  return isWithoutContext(parts.function()) ? inHaze(kContextDepth, parts) : parts;
+}
+
+bool FirstChoice::isWithoutContext(const TransferFunction& function) const {
+  const std::vector<double> depths = depthsOf(samples_, function);
+  return seenArea(samples_, silhouette_.view, depths) < kContext * silhouette_.area &&
+         !showsAPart(samples_, silhouette_.view, depths);
+}
+
+FunctionParts FirstChoice::inHaze(double depth, FunctionParts parts) const {
+  const double extinction = depth * silhouette_.area / samples_.volume;
+  parts.opacities = raisedTo(-std::expm1(-extinction * parts.opacity_unit), std::move(parts.opacities));
+  return parts;
 }
 
 BinWeights FirstChoice::seenIn(const VolumeHistogram& histogram, const TransferFunction& function) const {

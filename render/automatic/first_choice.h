@@ -20,8 +20,8 @@ namespace curvisplat {
 
 /// Whether the values differ by so little that only their noise could be drawn: 1e-4 of the largest.
 bool isNearlyConstant(const VariableInfo& variable);
-/// The position of the first variable that is not nearly constant; numbers of points and cells, and components of
-/// vectors that vary by rounding errors alone, come last; 0 if all are nearly constant. Requires one or more.
+/// The position of the first variable of the best kind (ScalarKind) that is not nearly constant; components of vectors that vary by
+/// rounding errors alone come last; 0 if all are nearly constant. Requires one or more.
 size_t firstVaryingVariable(const Manifest& manifest);
 
 class FirstChoice {
@@ -45,6 +45,10 @@ class FirstChoice {
 
  private:
   FunctionParts constantFunction() const;
+  /// Whether little of the data is seen in a picture of the whole of it.
+  bool isWithoutContext(const TransferFunction& function) const;
+  /// The function, with an opacity for all values that makes the data's mean depth as large as `depth`, or larger.
+  FunctionParts inHaze(double depth, FunctionParts parts) const;
   /// How much of the values in each bin is seen.
   BinWeights seenIn(const VolumeHistogram& histogram, const TransferFunction& function) const;
 

@@ -94,6 +94,20 @@ std::optional<VolumeHistogram> volumeHistogram(const CoarseSamples& samples,
   return histogram;
 }
 
+size_t fillingValues(const VolumeHistogram& histogram) {
+  constexpr double kMinFilled = 1.0 / VolumeHistogram::kBins, kMostOfVolume = 0.8;
+  constexpr size_t kMaxWidth = 2;  // bins: a value may lie between two
+  size_t values = 0, width = 0;
+  double filled = 0;
+  for (const double share : histogram.shares) {
+    width = share > kMinFilled ? width + 1 : 0;
+    if (width > kMaxWidth) return 0;
+    if (width > 0) filled += share;
+    if (width == 1) ++values;
+  }
+  return filled > kMostOfVolume ? values : 0;
+}
+
 namespace {
 
 constexpr double kRareness = 0.6;     // exponent; 0.5 to 0.7 look alike, 0.8 and more show noise
@@ -255,6 +269,11 @@ std::vector<OpacityPoint> opacityPoints(const VolumeHistogram& histogram, const 
   for (const size_t n : kept)
     points.push_back({roundedTo(static_cast<double>(n) / (kPlaces - 1), 1, 4),
                       opacities[n] > 0 ? roundedTo(opacities[n], opacities[n], 2) : 0});
+  return points;
+}
+
+std::vector<OpacityPoint> raisedTo(double least, std::vector<OpacityPoint> points) {
+  for (OpacityPoint& point : points) point.opacity = std::max(point.opacity, roundedTo(least, least, 2));
   return points;
 }
 

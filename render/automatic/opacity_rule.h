@@ -57,6 +57,9 @@ struct VolumeHistogram {
 std::optional<VolumeHistogram> volumeHistogram(const CoarseSamples& samples,
                                                const ValueDistribution& distribution);
 
+/// How many values fill most of the volume, as numbers of materials do: 0 if the values are spread.
+size_t fillingValues(const VolumeHistogram& histogram);
+
 using BinExtinctions = std::array<double, VolumeHistogram::kBins>;
 
 /// Relative extinctions of the histogram's bins; the largest is 1.
@@ -78,5 +81,8 @@ std::optional<std::pair<double, double>> narrowedInterval(const VolumeHistogram&
 /// extinction has an optical depth of 2.3, by at most 24 points. Positions are 0..1 from begin to end.
 std::vector<OpacityPoint> opacityPoints(const VolumeHistogram& histogram, const BinExtinctions& extinctions,
                                         double begin, double end);
+
+/// The points, each with an opacity of `least` or more.
+std::vector<OpacityPoint> raisedTo(double least, std::vector<OpacityPoint> points);
 
 }  // namespace curvisplat

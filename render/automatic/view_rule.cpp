@@ -227,6 +227,16 @@ struct SeenBoxes {
   }
 };
 
+}  // namespace
+
+bool showsAPart(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths) {
+  const Bounds bounds(samples);
+  const Camera camera = Camera::named(view, bounds.lower, bounds.upper, {1, 1}, Projection::kOrthographic);
+  return SeenBoxes(SeenSamples(samples, camera), depths).isCropped(1);
+}
+
+namespace {
+
 /// Some of the samples, standing for all: enough to compare sides.
 struct FewSamples {
   static constexpr size_t kSamples = 30'000;

@@ -29,6 +29,9 @@ Silhouette widestSilhouette(const CoarseSamples& samples);
 /// `depths` [sample]: volume times extinction, not negative; the unit does not matter. 0 if all are 0.
 double seenArea(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths);
 
+/// Whether a square picture from `view` shows only the small part of the data in which there is something to be seen (chooseView()).
+bool showsAPart(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths);
+
 /// Values of some of the samples, and how much is seen of each from the eight oblique sides together; the unit does not matter.
 struct SeenValues {
   std::vector<float> values;

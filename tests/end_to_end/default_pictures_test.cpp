@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <map>
 #include <memory>
 #include <ostream>
@@ -243,6 +245,76 @@ TEST_F(DefaultPictures, ASliceHasColoursForWhatTheVolumeHides) {
   };
   EXPECT_LT(highest({}), 0.4);
   EXPECT_GT(highest({"--slice", "0,0,0,1,0,0"}), 0.6);
+}
+
+/// A cube of [0, 1] with a function of x, y and z.
+class CubeOfValues : public ProgramTest {
+ protected:
+  template <typename Value>
+  void convert(const glm::dvec3& upper, const Value& valueAt) const {
+    constexpr int kSide = 32;
+    std::ofstream grid(file("a.xyz")), values(file("a.fun"));
+    grid << fmt::format("{0} {0} {0}\n", kSide);
+    values << fmt::format("{0} {0} {0} 1\n", kSide);
+    for (int axis = 0; axis < 3; ++axis)
+      eachNode(kSide, upper, [&](const glm::dvec3& at) { grid << at[axis] << '\n'; });
+    eachNode(kSide, upper, [&](const glm::dvec3& at) { values << valueAt(at) << '\n'; });
+    grid.close();
+    values.close();
+    run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
+  }
+  ProgramResult render(const Words& options = {}) const {
+    return run(Words{"render", file("a.splats"), "-o", file("a.png"), "--size", "160x160"} + options);
+  }
+  /// The least opacity of the function that was chosen.
+  double leastOpacity() const {
+    const std::string out = render().out;
+    std::istringstream points(out.substr(out.find("--opacity ") + 10));
+    double least = 1, x = 0, opacity = 0;
+    for (char colon = 0, comma = ','; comma == ',' && points >> x >> colon >> opacity;
+         comma = static_cast<char>(points.get()))
+      least = std::min(least, opacity);
+    return least;
+  }
+
+ private:
+  template <typename Take>
+  static void eachNode(int side, const glm::dvec3& upper, const Take& take) {
+    for (int n = 0; n < side * side * side; ++n)
+      take(upper * glm::dvec3(n % side, n / side % side, n / side / side) / (side - 1.0));
+  }
+};
+
+/// Two slabs in a third material, which fills most of the volume and was clear.
+TEST_F(CubeOfValues, NoMaterialIsClear) {
+  convert(glm::dvec3(1), [](const glm::dvec3& at) { return at.z < 0.2 ? 2 : at.z > 0.8 ? 3 : 1; });
+  EXPECT_GT(leastOpacity(), 0.005);
+}
+
+/// Two balls in corners of a cube, which nothing showed.
+TEST_F(CubeOfValues, WhatHappensInCornersIsDrawnInItsBox) {
+  convert(glm::dvec3(1), [](const glm::dvec3& at) {
+    const double away = std::min(glm::distance(at, {0.2, 0.2, 0.2}), glm::distance(at, {0.8, 0.2, 0.8}));
+    return away < 0.2 ? 2 - away / 0.2 : 0;
+  });
+  EXPECT_GT(leastOpacity(), 0.04);
+}
+
+/// Layers across z, which are seen from above as one.
+TEST_F(CubeOfValues, LayersOfThinDataAreExplained) {
+  convert({1, 1, 0.008}, [](const glm::dvec3& at) { return at.z; });
+  expectSays(render().err,
+             "if layers above one another are seen as one, --view iso --vertical-scale 30; or try --range");
+}
+
+TEST_F(DefaultPictures, NumberingsDoNotChooseTheCentring) {
+  std::ofstream grid(file("ids.vtk"));
+  grid << "# vtk DataFile Version 3.0\nids\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 2\nORIGIN 0 0 "
+          "0\nSPACING 1 1 1\n"
+          "POINT_DATA 12\nSCALARS node_groups int\nLOOKUP_TABLE default\n0 1 2 3 4 5 6 7 8 9 10 11\n"
+          "CELL_DATA 2\nSCALARS stress float\nLOOKUP_TABLE default\n1 2\n";
+  grid.close();
+  expectSays(run({"convert", file("ids.vtk"), "-o", file("ids.splats")}).err, "left out: node_groups");
 }
 
 TEST_F(DefaultPictures, AConstantScalarIsNotChosen) {

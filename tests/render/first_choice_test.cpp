@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
+#include <initializer_list>
 #include <numbers>
 #include <random>
 #include <string>
@@ -324,6 +325,37 @@ TEST(FirstChoice, NumbersOfPointsAreTheLastScalarToDraw) {
   EXPECT_EQ(firstVaryingVariable(manifest), 2u);
   manifest.variables[2].max = 0;
   EXPECT_EQ(firstVaryingVariable(manifest), 0u);
+}
+
+TEST(FirstChoice, FieldsComeBeforeMaterialsPlacesAndNumberings) {
+  Manifest manifest;
+  const auto firstOf = [&](std::initializer_list<const char*> names) {
+    manifest.variables.clear();
+    for (const char* name : names) manifest.variables.push_back({0, name, "", 0, 9});
+    return manifest.variables[firstVaryingVariable(manifest)].name;
+  };
+  EXPECT_EQ(
+      firstOf({"Coordinate:mag", "Depth wrt surface", "nav_lat", "lon_rho", "x", "cellID", "Temperature"}),
+      "Temperature");
+  EXPECT_EQ(firstOf({"node_groups", "Coords:x", "mat_id", "MaterialIds"}), "mat_id");
+  EXPECT_EQ(firstOf({"GlobalNodeId", "PointIds", "latitude"}), "latitude");
+  EXPECT_EQ(firstOf({"GlobalNodeId", "gmsh:physical"}), "gmsh:physical");
+  for (const char* field :
+       {"Void_Fraction", "fluid", "X-momentum", "XVelocity", "material density", "1", "\xc3\xa9nergie"})
+    EXPECT_EQ(firstOf({"Topography", field, "T"}), field);
+}
+
+TEST(FirstChoice, FewValuesThatFillTheVolumeAreCounted) {
+  VolumeHistogram histogram;
+  for (const size_t bin : {0, 63, 64, 127}) histogram.shares[bin] = 0.22;  // a value may lie between two bins
+  EXPECT_EQ(fillingValues(histogram), 3u);
+  histogram.shares[0] = histogram.shares[63] = 0;
+  EXPECT_EQ(fillingValues(histogram), 0u) << "less than most of the volume";
+  histogram.shares = {};
+  histogram.shares[5] = 0.98;
+  EXPECT_EQ(fillingValues(histogram), 1u);
+  std::fill_n(histogram.shares.begin(), 12, 1.0 / 12);
+  EXPECT_EQ(fillingValues(histogram), 0u) << "spread";
 }
 
 TEST(FirstChoice, NumbersAreRoundedToDigitsOfTheScale) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <climits>
 #include <iterator>
 #include <set>
 #include <string>
@@ -55,14 +56,19 @@ int lateness(const GridScalar& scalar, const std::set<std::string>& names) {
   return names.count(vector + ":mag") > 0 ? 2 : 3;
 }
 
-/// The centring of the first scalar, unless scalars of the other alone are well known.
+/// The centring of the first scalar, unless the best of the other is better: well known, or of a better kind.
 Centring defaultCentring(const GridDescription& description, const std::vector<uint32_t>& stored) {
+  const auto bestOf = [&](bool is_first) {
+    int best = INT_MAX;
+    for (const uint32_t n : stored) {
+      const GridScalar& scalar = description.scalars[n];
+      if ((scalar.centring == description.scalars[stored.front()].centring) == is_first)
+        best = std::min(best, isWellKnown(scalar) ? -1 : static_cast<int>(kindOf(scalar.name)));
+    }
+    return best;
+  };
   const Centring first = description.scalars[stored.front()].centring;
-  bool any_first = false, any_other = false;
-  for (const uint32_t n : stored)
-    if (isWellKnown(description.scalars[n]))
-      (description.scalars[n].centring == first ? any_first : any_other) = true;
-  if (any_first || !any_other) return first;
+  if (bestOf(true) <= bestOf(false)) return first;
   return first == Centring::kNode ? Centring::kCell : Centring::kNode;
 }
 

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "render/automatic/first_choice.h"
+#include "render/colour/function_parts.h"
 #include "render/image/image.h"
 
 namespace curvisplat {
@@ -190,6 +191,19 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   return reasons;
 }
 
+/// The options that show the layers of data which is thin in z, or on a sphere; empty if it is neither, or stretched already.
+std::string stretchingFor(const RenderedScene& scene) {
+  constexpr double kThin = 0.1, kStretched = 0.25;  // of the larger width
+  const auto& globe = scene.manifest.globe;
+  if (scene.options.scale.z != 1) return {};
+  if (globe && globe->sphere()) return globe->vertical_scale == 1 ? "convert with --vertical-scale 50" : "";
+  const glm::dvec3 extent = scene.manifest.upper - scene.manifest.lower;
+  const double width = std::max(extent.x, extent.y);
+  if (!(extent.z > 0 && extent.z < kThin * width)) return {};
+  const double factor = kStretched * width / extent.z * (globe ? std::abs(globe->vertical_scale) : 1);
+  return fmt::format("--view iso --vertical-scale {:g}", roundedTo(factor, factor, 1));
+}
+
 std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
                                const std::string& function_options) {
   // Parts of the picture; of what is seen. A vortex above a flat sea may be a twentieth of what is seen.
@@ -212,14 +226,11 @@ std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
   if (blank)
     return fmt::format("the picture is {}; try --opacity auto --opacity-unit {:.2g} or --view iso", what,
                        scene.transfer_function.opacityUnit() / 10);
-  const auto& globe = scene.manifest.globe;
-  std::string stretched;
-  if (globe && globe->vertical_scale == 1 && scene.options.scale.z == 1)
-    stretched = fmt::format("if layers above one another are seen as one, {}--vertical-scale 50; or ",
-                            globe->sphere() ? "convert with " : "");
+  const std::string stretching = stretchingFor(scene);
   return fmt::format(
-      "the picture is {}; {}try --range 1%,99%, or --clip-box if the outermost layer hides the rest", what,
-      stretched);
+      "the picture is {}; {}{}try --range 1%,99%, or --clip-box if the outermost layer hides the rest", what,
+      stretching.empty() ? "" : "if layers above one another are seen as one, ",
+      stretching.empty() ? "" : stretching + "; or ");
 }
 
 std::string rangeMissesScalar(const VariableInfo& variable, const TransferFunction& transfer_function) {
