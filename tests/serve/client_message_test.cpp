@@ -130,11 +130,19 @@ TEST(ClientMessage, IsReadWithEachType) {
       parsed<FunctionRequest>(R"({"type": "choose", "cache": 0, "scalar": "rho", "dark": false})");
   EXPECT_EQ(choose.scalar, "rho");
   EXPECT_FALSE(choose.dark);
+  EXPECT_FALSE(choose.with_sheets);
   EXPECT_TRUE(parsed<FunctionRequest>(R"({"type": "choose", "cache": 0, "scalar": "rho"})").dark);
+  EXPECT_TRUE(parsed<FunctionRequest>(R"({"type": "choose", "cache": 0, "scalar": "rho", "sheets": true})")
+                  .with_sheets);
   const auto histogram = parsed<HistogramRequest>(
       R"({"type": "histogram", "cache": 0, "scalar": "rho", "low": -1, "high": 2, "log": false})");
   EXPECT_EQ(histogram.low, -1);
   EXPECT_EQ(histogram.high, 2);
+  EXPECT_FALSE(histogram.asinh);
+  const auto in_asinh = parsed<HistogramRequest>(
+      R"({"type": "histogram", "cache": 0, "scalar": "a", "low": -1, "high": 2, "log": false, "asinh": [0.5, 0.1]})");
+  ASSERT_TRUE(in_asinh.asinh);
+  EXPECT_EQ(in_asinh.asinh->width, 0.1);
   EXPECT_EQ(parsed<ColoursRequest>(R"({"type": "colours", "map": "viridis"})").map, "viridis");
   const auto colours = parsed<ColoursRequest>(
       R"({"type": "colours", "map": "viridis", "parts": {"map": "grey", "range": [1, 3], "opacity_unit": 2}})");
@@ -184,6 +192,11 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
   refuses(R"({"type": "histogram", "cache": 0, "scalar": "a", "low": -1e308, "high": 1e308, "log": false})",
           "high");
   refuses(R"({"type": "histogram", "cache": 0, "scalar": "a", "low": 0, "high": 2, "log": true})", "low");
+  for (const char* asinh : {"[0.5]", "[0, 0]", "[0, 1e300]", "[1e300, 1]", "[0, 1e-300]"})
+    refuses(
+        R"({"type": "histogram", "cache": 0, "scalar": "a", "low": -1e9, "high": 1e9, "log": false, "asinh": )" +
+            std::string(asinh) + "}",
+        "asinh");
   refuses(
       R"({"type": "colours", "map": "grey", "parts": {"map": "grey", "range": [3, 1], "opacity_unit": 2}})",
       "parts.range");

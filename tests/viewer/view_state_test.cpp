@@ -96,7 +96,7 @@ TEST(ViewState, ComesBackFromItsText) {
   }
 }
 
-/// In a narrower window one sees as much of the width; in a usual one the view comes back.
+/// A narrower window shows as much of the width; in a usual one the view comes back.
 TEST(ViewState, AKeptViewFitsAnotherShape) {
   ViewState state = changedState();
   state.annotations = {};

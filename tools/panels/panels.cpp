@@ -311,9 +311,7 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
   // Not "light" beside "dark", which reads as a choice of two.
   actions.changed |= ImGui::Checkbox("lighting", &state.lit);
   nameWidget("light");
-  hint(
-      "shades the volume, surfaces, isosurfaces and slices: shapes stand out, colours are darker than the "
-      "scalar bar's");
+  hint("shapes stand out; colours are darker than the scalar bar's");
   ImGui::SameLine(column);
   if (ImGui::Checkbox("dark background", &state.dark)) {
     state.suitBackground();

@@ -168,6 +168,9 @@ HistogramRequest histogramIn(const JsonField& message) {
     const std::vector<JsonField> both = asinh->elements(2);
     if (both.size() != 2) asinh->fail("centre and width");
     histogram.asinh = AsinhScale{both[0].number(-1e300, 1e300), both[1].number(1e-300, 1e300)};
+    const double extent =
+        histogram.asinh->coordinate(histogram.high) - histogram.asinh->coordinate(histogram.low);
+    if (!(extent > 1e-6 && extent < 1e6)) asinh->fail("a scale that divides the range");  // NaN fails, too
   }
   return histogram;
 }

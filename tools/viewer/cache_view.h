@@ -147,7 +147,7 @@ class CacheView {
   void findIsosurface(const std::string& scalar, std::optional<uint64_t> replaced = {});
   void takeIsosurfaces();
   void saveMovieTo(const FileDialog::Chosen& chosen);
-  /// What the user chose for movies of a kind.
+  /// The user's choice for movies of a kind.
   struct MovieChoice {
     std::optional<ImageSize> size = std::nullopt;  // none: as shown
     double frames_per_s = kFramesPerSecond;
