@@ -2,7 +2,6 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <numbers>
@@ -94,23 +93,6 @@ TEST(ViewState, ComesBackFromItsText) {
     else
       EXPECT_EQ(value, after.at(field)) << field;
   }
-}
-
-/// A narrower window shows as much of the width; in a usual one the view comes back.
-TEST(ViewState, AKeptViewFitsAnotherShape) {
-  ViewState state = changedState();
-  state.annotations = {};
-  const auto in = [&](const ViewState& kept, ImageSize from, ImageSize to) {
-    return keptView(keptText(kept, from), "a.json", manifest(), to);
-  };
-  EXPECT_EQ(toJson(in(state, {600, 400}, {1200, 400})),
-            toJson(viewStateFromJson(toJson(state), "a.json", manifest())));
-  const ViewState narrow = in(state, {600, 400}, {300, 400});
-  EXPECT_NEAR(narrow.camera.parallel_scale, 2 * state.camera.parallel_scale, 1e-9);
-  EXPECT_NEAR(glm::distance(narrow.camera.position, narrow.camera.focal_point),
-              2 * glm::distance(state.camera.position, state.camera.focal_point), 1e-9);
-  const ViewState back = in(narrow, {300, 400}, {900, 400});
-  EXPECT_NEAR(glm::distance(back.camera.position, state.camera.position), 0, 1e-9);
 }
 
 TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {

@@ -19,7 +19,6 @@
 #include "stream/base/json_document.h"
 #include "stream/base/text.h"
 #include "stream/cache/faces_file.h"
-#include "tools/view/picture_layout.h"
 
 namespace curvisplat {
 namespace {
@@ -145,30 +144,6 @@ std::vector<std::string> savedViewsOf(const fs::path& cache) {
 
 fs::path savedViewOf(const fs::path& cache, const std::string& name) {
   return viewFolderOf(cache) / (fileNameOf(name) + ".json");
-}
-
-std::string keptText(const ViewState& state, ImageSize data) {
-  auto json = nlohmann::ordered_json::parse(toJson(state));
-  json["shape"] = static_cast<double>(data.width) / data.height;
-  return json.dump(1) + "\n";
-}
-
-ViewState keptView(const std::string& text, const std::filesystem::path& file, const Manifest& manifest,
-                   ImageSize picture) {
-  constexpr double kUsual = 1.5, kSame = 0.03;  // bars of other texts change the shape a little
-  ViewState state = viewStateFromJson(text, file, manifest);
-  const JsonDocument document(text, file.string(), "the state of a window");
-  const auto kept = document.root().find("shape");
-  if (!kept) return state;
-  const ImageSize data = dataSizeOf(state, manifest, picture);
-  const auto narrower = [](double shape) { return std::max(1.0, kUsual / shape); };
-  const double factor =
-      narrower(static_cast<double>(data.width) / data.height) / narrower(kept->number(1e-3, 1e3));
-  if (std::abs(factor - 1) < kSame) return state;
-  Camera& camera = state.camera;
-  camera.parallel_scale *= factor;
-  camera.position = camera.focal_point + factor * (camera.position - camera.focal_point);
-  return state;
 }
 
 void writeState(const fs::path& file, const std::string& text) {

@@ -46,13 +46,6 @@ std::vector<std::string> savedViewsOf(const std::filesystem::path& cache);
 /// The file of a saved view; any text is a name. Throws Error without a configuration folder.
 std::filesystem::path savedViewOf(const std::filesystem::path& cache, const std::string& name);
 
-/// The state as files keep it: with the shape of the data's part of the picture, which has the size `data`.
-std::string keptText(const ViewState& state, ImageSize data);
-/// Reads that for a window's picture: in a narrower one than it was kept for, the view is from further away, as far as one sees as
-/// much of the width; in a wider one it comes back. Throws as viewStateFromJson().
-ViewState keptView(const std::string& text, const std::filesystem::path& file, const Manifest& manifest,
-                   ImageSize picture);
-
 /// Writes `text` to `file` and creates the folder if necessary. Throws Error.
 void writeState(const std::filesystem::path& file, const std::string& text);
 

@@ -501,7 +501,7 @@ void CacheView::remember() const {
   const auto file = rememberedStateOf(whole());
   if (!file) return;
   try {
-    writeState(*file, keptText(state_, data_size_));
+    writeState(*file, toJson(state_));
   } catch (const Error& error) {
     printMessage("warning: cannot save the view: {}", error.what());
   }

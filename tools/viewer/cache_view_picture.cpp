@@ -342,7 +342,7 @@ void CacheView::use(const FileDialog::Chosen& chosen) {
 
 void CacheView::saveView(const std::string& name) {
   try {
-    writeState(savedViewOf(whole(), name), keptText(state_, data_size_));
+    writeState(savedViewOf(whole(), name), toJson(state_));
     views_ = savedViewsOf(whole());
     say(fmt::format("saved the view \"{}\": View, Saved views", name));
   } catch (const Error& error) {
@@ -353,7 +353,7 @@ void CacheView::saveView(const std::string& name) {
 void CacheView::loadView(const std::string& name) {
   try {
     const fs::path file = savedViewOf(whole(), name);
-    ViewState state = keptView(readTextFile(file), file, manifest(), picture_size_);
+    ViewState state = viewStateFromJson(readTextFile(file), file, manifest());
     loadSurfaces(state);
     state.given = state_.given;
     restore(state);

@@ -98,10 +98,10 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   const EditedFunction automatic = state.function;
   const fs::path& whole = options.preview ? options.preview->whole : cache.cachePath();
   if (options.state) {
-    state = keptView(readTextFile(*options.state), *options.state, cache.manifest(), picture);
+    state = viewStateFromJson(readTextFile(*options.state), *options.state, cache.manifest());
   } else if (const auto remembered = rememberedStateOf(whole); remembered && fs::exists(*remembered)) {
     try {
-      ViewState found = keptView(readTextFile(*remembered), *remembered, cache.manifest(), picture);
+      ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, cache.manifest());
       loadSurfaces(found);
       state = std::move(found);
     } catch (const Error& error) {
