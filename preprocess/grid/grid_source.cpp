@@ -80,7 +80,9 @@ std::optional<std::string> timesText(const GridDescription& description) {
   if (times.size() < 2) return std::nullopt;
   constexpr int kMaxDigits = 17;
   int digits = 6;
-  while (digits < kMaxDigits && numberText(times[0], digits) == numberText(times[1], digits)) ++digits;
+  const bool differ = times[0] < times[1] || times[0] > times[1];  // not NaN
+  while (differ && digits < kMaxDigits && numberText(times[0], digits) == numberText(times[1], digits))
+    ++digits;
   if (digits > 6) digits = std::min(digits + 2, kMaxDigits);  // where they tell the first steps apart
   return fmt::format("{} time steps from {} to {}", times.size(), numberText(times.front(), digits),
                      numberText(times.back(), digits));

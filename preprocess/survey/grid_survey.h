@@ -40,7 +40,8 @@ struct GridSurvey {
 };
 
 /// Sentences on those of these scalars that single precision cannot show: no value but 0 is large enough for it, or they differ by so
-/// little that it loses them, for which some of the values are read again. `ranges`: [scalar].
+/// little that it loses them; and on derived ones that need an absolute pressure where it is negative. Reads some of the values
+/// again. `ranges`: [scalar].
 std::vector<std::string> warningsOfRanges(const DataSource& source, std::span<const uint32_t> scalars,
                                           std::span<const ScalarRange> ranges);
 

@@ -273,7 +273,8 @@ std::vector<OpacityPoint> opacityPoints(const VolumeHistogram& histogram, const 
 }
 
 std::vector<OpacityPoint> raisedTo(double least, std::vector<OpacityPoint> points) {
-  for (OpacityPoint& point : points) point.opacity = std::max(point.opacity, roundedTo(least, least, 2));
+  least = roundedTo(least, least, 2);
+  for (OpacityPoint& point : points) point.opacity = std::max(point.opacity, least);
   return points;
 }
 

@@ -57,7 +57,7 @@ struct VolumeHistogram {
 std::optional<VolumeHistogram> volumeHistogram(const CoarseSamples& samples,
                                                const ValueDistribution& distribution);
 
-/// How many values fill most of the volume, as numbers of materials do: 0 if the values are spread.
+/// How many values fill most of the volume, as numbers of materials do: 0 if they do not, or are spread.
 size_t fillingValues(const VolumeHistogram& histogram);
 
 using BinExtinctions = std::array<double, VolumeHistogram::kBins>;

@@ -59,9 +59,9 @@ ScalarKind kindOf(std::string_view name) {
   if (isIn(words.back(), kMaterials) || (is_number && isIn(words.front(), kMaterials)))
     return ScalarKind::kMaterial;
   if (is_number || name == "vtkCompositeIndex") return ScalarKind::kNumbering;
-  const bool is_axis = words.size() == 1 && words[0].size() == 1 && words[0] >= "x" && words[0] <= "z";
-  return is_axis || isIn(words.front(), kPlaces) || isIn(words.back(), kPlaces) ? ScalarKind::kPlace
-                                                                                : ScalarKind::kField;
+  const bool is_axis = name.size() == 1 && name >= "x" && name <= "z";          // "Z" is a mixture fraction
+  const bool ends_so = isIn(words.back(), kPlaces) && words.back() != "depth";  // "optical_depth" is a field
+  return is_axis || isIn(words.front(), kPlaces) || ends_so ? ScalarKind::kPlace : ScalarKind::kField;
 }
 
 }  // namespace curvisplat

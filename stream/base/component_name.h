@@ -12,8 +12,8 @@ std::string_view vectorOf(std::string_view name);
 /// Kinds of scalars, the best to look at first: computed fields, numbers of materials, places, and numbers of points and cells.
 enum class ScalarKind { kField, kMaterial, kPlace, kNumbering };
 
-/// The kind that the words of the name tell: "mat_id", "MaterialIds" and "gmsh:physical" are materials, "Coordinate:mag", "lon_rho" and "Depth" places,
-/// "GlobalNodeId" and "node_groups" numberings.
+/// The kind that the words of the name tell: "mat_id", "MaterialIds" and "gmsh:physical" are materials, "Coordinate:mag",
+/// "lon_rho" and "Depth" places, "GlobalNodeId" and "node_groups" numberings.
 ScalarKind kindOf(std::string_view name);
 
 }  // namespace curvisplat

@@ -269,12 +269,14 @@ class CubeOfValues : public ProgramTest {
   /// The least opacity of the function that was chosen.
   double leastOpacity() const {
     const std::string out = render().out;
-    std::istringstream points(out.substr(out.find("--opacity ") + 10));
-    double least = 1, x = 0, opacity = 0;
+    const size_t option = out.find("--opacity ");
+    if (option == std::string::npos) return -1;
+    std::istringstream points(out.substr(option + 10));
+    double least = 1, x = 0, opacity = -1;
     for (char colon = 0, comma = ','; comma == ',' && points >> x >> colon >> opacity;
          comma = static_cast<char>(points.get()))
       least = std::min(least, opacity);
-    return least;
+    return opacity < 0 ? -1 : least;
   }
 
  private:
@@ -304,7 +306,8 @@ TEST_F(CubeOfValues, WhatHappensInCornersIsDrawnInItsBox) {
 TEST_F(CubeOfValues, LayersOfThinDataAreExplained) {
   convert({1, 1, 0.008}, [](const glm::dvec3& at) { return at.z; });
   expectSays(render().err,
-             "if layers above one another are seen as one, --view iso --vertical-scale 30; or try --range");
+             "if layers above one another are seen as one, draw it with --view iso --vertical-scale 30; or "
+             "try --range");
 }
 
 TEST_F(DefaultPictures, NumberingsDoNotChooseTheCentring) {

@@ -120,7 +120,7 @@ class Columns(ModelFileTest):
 
     def test_what_lacks_is_said(self):
         self.mesh(at=None).close()
-        self.assertIn("is a grid of UGRID alone; give the file with its scalars before it", self.info(fails=True))
+        self.assertIn("is a grid of UGRID, and no scalar lies at its faces or nodes; give the file with its scalars before it", self.info(fails=True))
         with self.mesh(at=None) as f:
             f.add("h", "time face", np.ones((1, 3)), "f4")
         self.assertIn("is a grid of UGRID, but no scalar has layers: no part of it has a volume (found h)", self.info(fails=True))

@@ -544,7 +544,7 @@ class Places(ModelFileTest):
             f.add("verticesOnCell", "nCells maxEdges", np.ones((4, 3)), "i4")
             f.add("nEdgesOnCell", "nCells", [3] * 4, "i4")
             f.add("kiteAreasOnVertex", "nVertices vertexDegree", np.ones((6, 3)))
-        self.assertIn("a grid of MPAS alone; give the file with its scalars before it", self.info(fails=True))
+        self.assertIn("a grid of MPAS, and no scalar lies at its faces or nodes; give the file with its scalars before it", self.info(fails=True))
 
 
 class Fields(ModelFileTest):

@@ -340,8 +340,8 @@ TEST(FirstChoice, FieldsComeBeforeMaterialsPlacesAndNumberings) {
   EXPECT_EQ(firstOf({"node_groups", "Coords:x", "mat_id", "MaterialIds"}), "mat_id");
   EXPECT_EQ(firstOf({"GlobalNodeId", "PointIds", "latitude"}), "latitude");
   EXPECT_EQ(firstOf({"GlobalNodeId", "gmsh:physical"}), "gmsh:physical");
-  for (const char* field :
-       {"Void_Fraction", "fluid", "X-momentum", "XVelocity", "material density", "1", "\xc3\xa9nergie"})
+  for (const char* field : {"Void_Fraction", "fluid", "X-momentum", "XVelocity", "material density", "1",
+                            "\xc3\xa9nergie", "Z", "y+", "optical_depth"})
     EXPECT_EQ(firstOf({"Topography", field, "T"}), field);
 }
 

@@ -5,8 +5,8 @@
 
 Each `--` begins the files of another target. A group has at most SIZE files. None of them declares a name for itself that another one
 declares, too, or that a header declares which another one includes (a type or constant; in headers of the tests any name): a static
-function, or one in a namespace without name, say. What is declared is read from the layout: our formatter puts declarations of a namespace at the beginning of a line, and nothing
-else."""
+function, or one in a namespace without name, say. What is declared is read from the layout: our formatter puts declarations of a
+namespace at the beginning of a line, and nothing else."""
 import functools
 import itertools
 import pathlib

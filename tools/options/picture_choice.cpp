@@ -23,7 +23,7 @@ namespace curvisplat {
 
 void addScalarOption(CLI::App& command, ScalarArguments& arguments) {
   command.add_option("--scalar", arguments.scalar,
-                     "Name of the scalar to draw (default: the first that is not constant)");
+                     "Name of the scalar to draw (default: the first field that is not constant)");
 }
 
 void addFunctionOptions(CLI::App& command, ScalarArguments& arguments, const std::string& group) {

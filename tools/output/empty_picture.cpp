@@ -201,7 +201,7 @@ std::string stretchingFor(const RenderedScene& scene) {
   const double width = std::max(extent.x, extent.y);
   if (!(extent.z > 0 && extent.z < kThin * width)) return {};
   const double factor = kStretched * width / extent.z * (globe ? std::abs(globe->vertical_scale) : 1);
-  return fmt::format("--view iso --vertical-scale {:g}", roundedTo(factor, factor, 1));
+  return fmt::format("draw it with --view iso --vertical-scale {:g}", roundedTo(factor, factor, 1));
 }
 
 std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
@@ -226,11 +226,12 @@ std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
   if (blank)
     return fmt::format("the picture is {}; try --opacity auto --opacity-unit {:.2g} or --view iso", what,
                        scene.transfer_function.opacityUnit() / 10);
-  const std::string stretching = stretchingFor(scene);
+  std::string stretching = stretchingFor(scene);
+  if (!stretching.empty())
+    stretching = fmt::format("if layers above one another are seen as one, {}; or ", stretching);
   return fmt::format(
-      "the picture is {}; {}{}try --range 1%,99%, or --clip-box if the outermost layer hides the rest", what,
-      stretching.empty() ? "" : "if layers above one another are seen as one, ",
-      stretching.empty() ? "" : stretching + "; or ");
+      "the picture is {}; {}try --range 1%,99%, or --clip-box if the outermost layer hides the rest", what,
+      stretching);
 }
 
 std::string rangeMissesScalar(const VariableInfo& variable, const TransferFunction& transfer_function) {

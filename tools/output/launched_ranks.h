@@ -27,7 +27,7 @@ Ranks& launchedRanks();
 /// for. Options for one machine may differ: names of files that are read, --tmp, --threads, --stats and --trace.
 void requireSameOptions(const CLI::App& command);
 
-/// Throws Error at a rank that finds another number of time steps in its files than rank 0.
+/// Throws Error at a rank that finds another number of time steps in its files than rank 0. All ranks call it.
 void requireSameSteps(uint64_t steps);
 
 /// Makes calls of the ranks throw Interrupted after progress.stop(), until the end of the scope.

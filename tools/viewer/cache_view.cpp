@@ -100,7 +100,9 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
 
 std::string CacheView::name() const {
   const std::vector<std::string>& sources = manifest().sources;
-  const bool has_solution = !grid_files_.empty() && sources.size() == 2;
+  const std::string& format = manifest().reader;
+  const bool is_grid_first = format.starts_with("PLOT3D") || format.starts_with("SU2");
+  const bool has_solution = is_grid_first && grid_files_.size() == 2 && sources.size() == 2;
   return (has_solution ? fs::path(sources.back()) : cache_.wholePath()).stem().string();
 }
 

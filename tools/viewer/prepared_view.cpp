@@ -113,6 +113,7 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
   if (options.scene) takeScene(options, cache, state);
   if (options.scene && state.coloursSheets() && state.function.isAutomatic())
     state.function = automaticFunction(cache, state.variable, true);
+  state.suitBackground();
   loadSurfaces(state);
   removeMissingFaces(options.faces, cache, state);
   if (options.camera) {

@@ -119,8 +119,11 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
   });
   if (groups.empty() && !lacking.empty()) throw Error("{}", lacking);
   if (groups.empty() && flat.empty())
-    throw Error("{}: is a grid of {} alone; give the file with its scalars before it (convert DATA GRID)",
-                file.path().string(), map.format);
+    throw Error(
+        "{}: is a grid of {}, and no scalar lies at its faces or nodes; give the file with its scalars "
+        "before "
+        "it (convert DATA GRID)",
+        file.path().string(), map.format);
   if (groups.empty())
     throw Error("{}: is a grid of {}, but no scalar has layers: no part of it has a volume (found {})",
                 file.path().string(), map.format, listed(namesOf(flat), 3));

@@ -190,8 +190,8 @@ void ColumnsSource::findFirstNode() {
   const bool from_zero = map_.first_node == 1 && zero_is_node && most < nodes;
   if (!from_one && !from_zero) return;
   description_.warnings.push_back(fmt::format(
-      "{} has the nodes {:g} to {:g}, which are counted from {:g}; its start_index {}",
-      map_.nodes_of_face->name, least, most, 1 - map_.first_node,
+      "{} has the nodes {} to {}, which are counted from {}; its start_index {}", map_.nodes_of_face->name,
+      least, most, 1 - map_.first_node,
       map_.nodes_of_face->attributes.contains("start_index") ? fmt::format("is {:g}", map_.first_node)
                                                              : "is missing"));
   map_.first_node = 1 - map_.first_node;
@@ -208,7 +208,7 @@ std::vector<int64_t> ColumnsSource::nodesOf(uint64_t first, uint64_t count) cons
       const double node = stored[n * sides + side] - map_.first_node;
       if (std::isnan(node) || (node < 0 && map_.format == "UGRID")) break;  // a fill value: fewer sides
       if (!(node >= 0 && node < static_cast<double>(map_.nodes)))
-        throw Error("{}: face {} has the node {:g}; expected {} to {}; the file is damaged",
+        throw Error("{}: face {} has the node {}; expected {} to {}; the file is damaged",
                     file_.path().string(), first + n, node + map_.first_node, map_.first_node,
                     static_cast<double>(map_.nodes) - 1 + map_.first_node);
       nodes[n * sides + side] = static_cast<int64_t>(node);

@@ -252,7 +252,9 @@ std::optional<std::string> foreignNetcdf(const NetcdfFiles& file) {
     return "a finite-element mesh (Exodus)";
   // FVCOM's and ICON's own marks come first: their files may follow the UGRID conventions too.
   if (mentions(file, {"source", "title"}, "FVCOM") || hasDimensions(file, {"node", "nele", "siglay"}))
-    return "an unstructured mesh (FVCOM) without UGRID's mesh_topology, by which faces are found";
+    return anyVariable(file, "cf_role", "mesh_topology")
+               ? "an unstructured mesh (FVCOM)"
+               : "an unstructured mesh (FVCOM) without UGRID's mesh_topology, by which faces are found";
   if (file.find("elementConn") && file.find("nodeCoords"))
     return "a mesh of ESMF, whose faces have neither layers nor scalars, and so no volume";
   if (file.hasAttribute("uuidOfHGrid") || file.hasAttribute("number_of_grid_used"))

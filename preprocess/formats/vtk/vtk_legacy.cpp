@@ -77,13 +77,14 @@ class LegacyReader : VtkLegacyFile {
       fail("has \"{}\" in its third line; expected ASCII or BINARY", encoding.substr(0, 30));
     ascii_ = encoding == "ascii";
     std::string word = nextWord();
+    const bool has_field = word == "field";
     // Field data may precede the grid.
     for (; word == "field" || word == "metadata"; word = nextWord())
       word == "field" ? readField() : skipMetadata();
     dataset_ = nextWord();
     constexpr const char* kExpected =
         "expected STRUCTURED_GRID, RECTILINEAR_GRID, STRUCTURED_POINTS or UNSTRUCTURED_GRID";
-    if (word.empty() || (word == "dataset" && dataset_ == "field"))
+    if ((word.empty() && has_field) || (word == "dataset" && dataset_ == "field"))
       fail("has field data alone, without a grid; {}", kExpected);
     if (word != "dataset") fail("found \"{}\"; expected DATASET", word.substr(0, 30));
     std::transform(dataset_.begin(), dataset_.end(), dataset_.begin(),

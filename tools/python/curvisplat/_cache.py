@@ -382,7 +382,7 @@ class Cache:
 
         What is left out is chosen from the data; `Picture.options` says what was.
 
-        scalar: a name (default: the first that is not constant). size: (width, height) in pixels.
+        scalar: a name (default: the first field that is not constant). size: (width, height) in pixels.
 
         camera, function: instead of the options that they have.
 
