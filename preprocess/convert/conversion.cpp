@@ -158,7 +158,7 @@ class Conversion {
     return std::move(report_);
   }
 
-  /// Where rank 0 alone surveys, the others throw DifferingBlanks as it does: all go on with it.
+  /// All ranks throw DifferingBlanks alike, also where rank 0 alone surveys: they go on with it together.
   void survey() {
     try {
       if (makesSplats()) splats_.survey = origin_->survey(progress_);

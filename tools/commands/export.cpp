@@ -221,7 +221,7 @@ std::string lackOfMemory(const std::exception& error) {
   return isForLackOfThreads(error) ? kNoThread : "";
 }
 
-/// What `compare` finds; nothing where there is no memory for it, which is no more than a warning: `file` is complete.
+/// Compares. Nothing where there is no memory for it, which is no more than a warning: `file` is complete.
 std::optional<Comparison> comparisonOf(const std::string& file, const std::function<Comparison()>& compare,
                                        Progress& progress) {
   try {

@@ -87,7 +87,7 @@ NetcdfSource::NetcdfSource(const OpenGridOptions& options, const NetcdfSource* b
 
 namespace {
 
-/// What to do with arrays that an XDMF file beside them may describe.
+/// Names the XDMF file beside an HDF5 file, which may describe its arrays, or says what to write.
 std::string adviceOnHdf5(const std::filesystem::path& path) {
   for (const char* const ending : {".xmf", ".xdmf"})
     for (const std::filesystem::path& name : {path.stem(), path.filename()}) {
