@@ -488,7 +488,7 @@ TEST_F(WindowMovie, IsAFileThatPlays) {
   click("file name");
   answer("movie/m.mp4");
   EXPECT_TRUE(isSaved());
-  // The same film, in the shell, and offered again.
+  // The command draws the same film in a shell, and the dialog offers it again.
   press("ctrl+shift+c");
   EXPECT_TRUE(eventually([] { return hasWidget("message copied the command for a film"); }));
   choose("File", "Save film: once around...");
