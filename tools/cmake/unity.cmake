@@ -1,4 +1,4 @@
-# Compiles sources together, ten at a time, of tests 24: most of a source's time is its headers'. unity_groups.py says which can be.
+# Compiles sources together, 16 at a time, of tests 24: most of a source's time is its headers'. unity_groups.py says which can be.
 # Those with options of their own stay alone, and those that are compiled once for each instruction set.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/unity_groups.py)
@@ -47,11 +47,12 @@ endfunction()
 
 get_property(folders DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTY SUBDIRECTORIES)
 foreach(folder ${folders})
-  # Not the tests' libraries: a program takes those files from them that it uses, and links what these need.
+  # Not the helpers of the tests: a program takes those files from them that it uses, and links what these need.
   if(folder STREQUAL "${PROJECT_SOURCE_DIR}/tests")
     curvisplat_together_in(${folder} EXECUTABLE 24)
+    curvisplat_together(curvisplat_test_reference 24)
   else()
-    curvisplat_together_in(${folder} "EXECUTABLE;STATIC_LIBRARY;OBJECT_LIBRARY;MODULE_LIBRARY" 10)
+    curvisplat_together_in(${folder} "EXECUTABLE;STATIC_LIBRARY;OBJECT_LIBRARY;MODULE_LIBRARY" 16)
   endif()
 endforeach()
 # All at once: a start of Python for each target took most of the time of configuring.

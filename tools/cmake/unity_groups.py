@@ -24,16 +24,20 @@ FUNCTION = re.compile(r"[^(=]*?(?<![:~\w])(\w+)\(")
 VARIABLE = re.compile(r"[^(={]*?(?<![:\w])(\w+)(?:\[[^\]]*\])*(?: =|\{|;)")
 HEADER = re.compile(r'#include "([^"]*/[^"]*\.h)"')
 NEXT = re.compile(r", (\w+)(?: =|\{)")  # of several variables on a line
+MACRO = re.compile(r"(?:[A-Z][A-Z0-9_]+|static_assert)\(")  # a macro's use declares nothing that it is given
+SHADER = re.compile(r'R"(\w*)\(.*?\)\1"', re.DOTALL)  # a text in another language
 
 
 def names(text):
     """What a source declares in its namespaces."""
     found = set()
-    for line in text.splitlines():
+    for line in SHADER.sub('""', text).splitlines():
         if not re.match(r"[\w#]", line) or OTHER.match(line):
             continue
         if match := TEST.match(line):
             found.add("_".join(match.groups()))
+        elif MACRO.match(line):
+            continue
         elif match := TYPE.match(line) or ALIAS.match(line) or FUNCTION.match(line):
             found.add(match[1])
         elif match := VARIABLE.match(line):
@@ -67,7 +71,8 @@ def groups(texts, size):
     size = -(-len(texts) // -(-len(texts) // size)) if texts else size  # as many groups, of the same size
     known, numbers = [], []
     for text in texts:
-        own, foreign = names(text), included(text)
+        foreign = included(text)
+        own = names(text) - foreign  # its headers declare the others, and the source defines them
         at = next((n for n, (count, declared, others) in enumerate(known)
                    if count < size and not own & declared and not own & others and not foreign & declared), len(known))
         if at == len(known):
