@@ -3,21 +3,20 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <initializer_list>
 #include <iterator>
 #include <limits>
 #include <numbers>
-#include <string_view>
 #include <utility>
 
 #include "stream/base/text.h"
 
 namespace curvisplat {
-namespace {
 
 bool isOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
   return std::find(words.begin(), words.end(), text) != words.end();
 }
+
+namespace {
 
 bool beginsWithOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
   return std::any_of(words.begin(), words.end(),
@@ -211,7 +210,6 @@ constexpr Layer kLayers[] = {
     {0, 288.15, -0.0065}, {11000, 216.65, 0},       {20000, 216.65, 0.001},  {32000, 228.65, 0.0028},
     {47000, 270.65, 0},   {51000, 270.65, -0.0028}, {71000, 214.65, -0.002},
 };
-constexpr double kSeaLevelPressure = 101325;
 
 double pressureAbove(const Layer& layer, double foot, double height) {
   const double rise = height - layer.height;

@@ -5,8 +5,10 @@
 #pragma once
 
 #include <cmath>
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "preprocess/formats/netcdf/netcdf_files.h"
 
@@ -28,6 +30,9 @@ enum class CfRole {
 /// missing, by customary names.
 /// Source: CF conventions 1.10, chapter 4.
 CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable);
+
+/// Whether a name, a unit or a meaning is one of these words.
+bool isOneOf(std::string_view text, std::initializer_list<std::string_view> words);
 
 /// Degrees in the unit of an angle: 1 unless it is the radian.
 double degreesOf(const std::string& unit);
@@ -60,6 +65,9 @@ bool growsDownwards(const NetcdfVariable& variable);
 /// The depth in metres at which sea water has a pressure, at 45 degrees of latitude.
 /// Source: P. M. Saunders, Practical Conversion of Pressure to Depth, J. Phys. Oceanogr. 11 (1981), 573-574.
 double depthOfSeaPressure(double decibar);
+
+/// The pressure at mean sea level in the standard atmosphere, in pascals.
+inline constexpr double kSeaLevelPressure = 101325;
 
 /// The height of a pressure in the standard atmosphere, in metres above mean sea level; negative for more
 /// than 101,325 Pa. NaN unless `pascals` is above 0.

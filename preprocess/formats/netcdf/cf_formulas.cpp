@@ -13,8 +13,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kSeaLevelPressure = 101325;
-
 /// "s: s_rho C: Cs_r" as {s: s_rho, C: Cs_r}.
 std::map<std::string, std::string> formulaTerms(const std::string& text) {
   std::map<std::string, std::string> terms;

@@ -9,11 +9,6 @@
 #include "preprocess/formats/netcdf/cf_vertical.h"
 
 namespace curvisplat {
-namespace {
-
-constexpr double kSeaLevelPressure = 101325;
-
-}  // namespace
 
 /// Source: CF conventions 1.10, appendix D.
 double CfVertical::formula(const AtNode& node) const {

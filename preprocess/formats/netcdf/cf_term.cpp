@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <sstream>
-#include <string_view>
 #include <utility>
 
 #include "preprocess/formats/netcdf/cf_coordinates.h"
@@ -221,10 +219,6 @@ CfValues CfTerm::read(const NetcdfFiles& file, const CfRange& range) const {
 }
 
 namespace {
-
-bool isOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
-  return std::find(words.begin(), words.end(), text) != words.end();
-}
 
 bool isWaterMask(const std::string& name, const std::string& standard_name) {
   return standard_name == "sea_binary_mask" || name.starts_with("mask_") || name.starts_with("hfac") ||
