@@ -19,8 +19,6 @@ namespace {
 // A side that is seen at a lower angle than this is seen edge-on: its sine.
 constexpr double kEdgeOn = 0.02;
 constexpr double kTick = 0.4, kGap = 0.35;  // in units of the font's size
-constexpr double kLabelSpace = 4.5;         // between ticks, in the same
-constexpr int kMinTicks = 3, kMaxTicks = 8;
 
 using Line = std::pair<glm::dvec2, glm::dvec2>;
 
@@ -41,10 +39,9 @@ class Box {
         if (const auto line = lineOf(edge(axis, n & 1, n & 2)))
           longest = std::max(longest, glm::distance(line->first, line->second));
       const double low = scene.lower[axis], high = scene.upper[axis];
-      const int wanted =
-          static_cast<int>(longest / (kLabelSpace * fontSize(scene.view.size, scene.text_size)));
+      const int wanted = ticksAlong(longest, fontSize(scene.view.size, scene.text_size));
       if (std::isfinite(low) && std::isfinite(high) && low < high)
-        ticks_[axis] = axisTicks({{low, high}}, std::clamp(wanted, kMinTicks, kMaxTicks));
+        ticks_[axis] = axisTicks({{low, high}}, wanted);
     }
   }
 
@@ -147,6 +144,11 @@ void drawLabels(cairo_t* cairo, const AnnotatedScene& scene, const Box& box, int
 }
 
 }  // namespace
+
+int ticksAlong(double edge_px, double font_px) {
+  constexpr double kLabelSpace = 4.5;  // between ticks, in units of the font's size
+  return std::clamp(static_cast<int>(edge_px / (kLabelSpace * font_px)), 3, kMaxTicks);
+}
 
 void drawEdgeLabels(cairo_t* cairo, const AnnotatedScene& scene, const LabelledEdge& edge,
                     const glm::dvec2& centre) {

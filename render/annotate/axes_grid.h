@@ -24,6 +24,11 @@ void drawAxesLabels(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec
 void drawGlobeGrid(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink);
 void drawGlobeLabels(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink);
 
+/// Ticks along an axis at most.
+inline constexpr int kMaxTicks = 8;
+/// The number of ticks whose coordinates have room along an edge: from 3 to kMaxTicks.
+int ticksAlong(double edge_px, double font_px);
+
 /// An edge of a box in the picture, with the coordinates along it.
 struct LabelledEdge {
   glm::dvec2 from, middle, to;

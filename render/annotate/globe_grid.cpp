@@ -18,9 +18,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr int kPieces = 48;          // of a bent line
-constexpr double kLabelSpace = 4.5;  // between ticks, in units of the font's size
-constexpr int kMinTicks = 3, kMaxTicks = 8;
+constexpr int kPieces = 48;         // of a bent line
 constexpr double kHalfEarth = 120;  // degrees of longitude: wider data hides what lies behind the Earth
 constexpr double kAround = 359.9;
 constexpr double kNearPole = 89;
@@ -63,10 +61,7 @@ class GlobeBox {
     for (int axis = 0; axis < 3; ++axis) {
       double longest = 0;
       for (int n = 0; n < 4; ++n) longest = std::max(longest, lengthOf(edge(axis, n & 1, n & 2)));
-      const int wanted =
-          around_ ? kMaxTicks
-                  : std::clamp(static_cast<int>(longest / (kLabelSpace * font)), kMinTicks, kMaxTicks);
-      setTicks(axis, wanted);
+      setTicks(axis, around_ ? kMaxTicks : ticksAlong(longest, font));
     }
   }
 
