@@ -16,8 +16,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{600, 600};
-constexpr float kSide = 600;
+constexpr ImageSize kPaintedPicture{600, 600};
+constexpr float kPictureSide = 600;
 enum Kind { kFlat, kSmooth, kSteps };
 
 ClassificationTable tableFor(int64_t kind) {
@@ -37,8 +37,8 @@ std::vector<ScreenSplat> roundSplats(float radius) {
   std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
   std::vector<ScreenSplat> splats(static_cast<size_t>(2e7 / (M_PI * radius * radius)));
   for (ScreenSplat& splat : splats)
-    splat = {kSide * unit(random),
-             kSide * unit(random),
+    splat = {kPictureSide * unit(random),
+             kPictureSide * unit(random),
              l,
              0,
              l,
@@ -64,7 +64,7 @@ void paint(benchmark::State& state, Backend which) {
   constexpr size_t kSegment = 16384;
   for (auto _ : state)
     backend->run([&](Painter& painter) {
-      painter.begin(kSize, glm::vec4(1), table, {.per_pixel = state.range(1) != kFlat});
+      painter.begin(kPaintedPicture, glm::vec4(1), table, {.per_pixel = state.range(1) != kFlat});
       for (size_t n = 0; n < splats.size(); n += kSegment)
         painter.draw(std::span(splats).subspan(n, std::min(kSegment, splats.size() - n)));
       benchmark::DoNotOptimize(painter.end().rgba.data());

@@ -18,8 +18,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr int kSide = 96;
-constexpr uint64_t kNodes = uint64_t{kSide} * kSide * kSide;
+constexpr int kNodesAlongAxis = 96;
+constexpr uint64_t kNodes = uint64_t{kNodesAlongAxis} * kNodesAlongAxis * kNodesAlongAxis;
 
 using WriteGrid = std::function<void(const std::filesystem::path&)>;
 
@@ -48,7 +48,7 @@ void readVts(benchmark::State& state, VtsEncoding::Format format, VtsEncoding::C
   encoding.format = format;
   encoding.compressor = compressor;
   readFormat(state, "grid.vts", "p", [&](const std::filesystem::path& path) {
-    VtsGrid grid = annulusVtsGrid(kSide, kSide, kSide);
+    VtsGrid grid = annulusVtsGrid(kNodesAlongAxis, kNodesAlongAxis, kNodesAlongAxis);
     std::erase_if(grid.point_data, [](const VtsArray& array) { return array.name != "p"; });
     grid.cell_data.clear();
     std::ofstream(path, std::ios::binary) << vtsFile(grid, encoding);
@@ -66,7 +66,7 @@ void readCgns(benchmark::State& state, CgnsFileType type) {
   readFormat(state, "grid.cgns", "Pressure", [&](const std::filesystem::path& path) {
     CgnsWriter file(path, type);
     file.base("base");
-    file.zone("zone", {kSide, kSide, kSide});
+    file.zone("zone", {kNodesAlongAxis, kNodesAlongAxis, kNodesAlongAxis});
     const auto along = [](double i, double j, double k) {
       return [=](int64_t at_i, int64_t at_j, int64_t at_k) {
         return i * static_cast<double>(at_i) + j * static_cast<double>(at_j) + k * static_cast<double>(at_k);
@@ -86,7 +86,7 @@ void readNetcdf(benchmark::State& state, NetcdfFileType type) {
   readFormat(state, "grid.nc", "temp", [&](const std::filesystem::path& path) {
     NetcdfWriter file(path, type);
     const auto axis = [&](const char* name, const NetcdfAttributes& attributes, double step) {
-      file.dimension(name, kSide);
+      file.dimension(name, kNodesAlongAxis);
       file.variable(name, NetcdfNumbers::kDoublePrecision, {name}, attributes,
                     [=](const std::vector<size_t>& at) { return 1 + step * static_cast<double>(at[0]); });
     };

@@ -18,7 +18,7 @@ namespace curvisplat {
 namespace {
 
 constexpr int32_t kNi = 200, kNj = 200, kNk = 200;
-constexpr uint64_t kNodes = uint64_t{kNi} * kNj * kNk;
+constexpr uint64_t kGridNodes = uint64_t{kNi} * kNj * kNk;
 
 template <typename Stored>
 Stored stored(Stored value, bool swap) {
@@ -31,8 +31,9 @@ void writeFile(const std::filesystem::path& path, std::vector<int32_t> header, i
   OutputFile file(path);
   for (int32_t& number : header) number = stored(number, swap);
   file.append(std::span<const int32_t>(header));
-  std::vector<Value> values(kNodes);
-  for (uint64_t n = 0; n < kNodes; ++n) values[n] = stored(static_cast<Value>(n) / Value{kNodes}, swap);
+  std::vector<Value> values(kGridNodes);
+  for (uint64_t n = 0; n < kGridNodes; ++n)
+    values[n] = stored(static_cast<Value>(n) / Value{kGridNodes}, swap);
   for (int array = 0; array < arrays; ++array) file.append(std::span<const Value>(values));
   file.close();
 }
@@ -56,7 +57,7 @@ void readNodes(benchmark::State& state, bool swap) {
         benchmark::DoNotOptimize(nodes.x.data());
       }
   }
-  const auto values = static_cast<int64_t>(4 * kNodes * state.iterations());
+  const auto values = static_cast<int64_t>(4 * kGridNodes * state.iterations());
   state.SetItemsProcessed(values);
   state.SetBytesProcessed(values * static_cast<int64_t>(sizeof(Value)));
   std::filesystem::remove(options.grid);

@@ -52,7 +52,7 @@ bool finishStandardOutput() {
   return false;
 }
 
-void print(std::string_view text) {
+void writeToStderr(std::string_view text) {
   // Nothing that allocates, and nothing of the C++ library, which may not be ready yet.
   [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
 }
@@ -65,19 +65,19 @@ void print(std::string_view text) {
   try {
     if (std::current_exception()) throw;
   } catch (const std::bad_alloc&) {
-    print("curvisplat: out of memory; lower --memory or --size, or use a machine with more memory\n");
+    writeToStderr("curvisplat: out of memory; lower --memory or --size, or use a machine with more memory\n");
     ::_exit(1);
   } catch (const std::exception& error) {
     // TBB throws a runtime_error with this text.
     if (std::strstr(error.what(), std::strerror(EAGAIN))) {
-      print(
+      writeToStderr(
           "curvisplat: cannot start a thread; raise the limits of processes and memory (ulimit -u, ulimit "
           "-v)\n");
       ::_exit(1);
     }
-    print("curvisplat: internal error: ");
-    print(error.what());
-    print("\n");
+    writeToStderr("curvisplat: internal error: ");
+    writeToStderr(error.what());
+    writeToStderr("\n");
   } catch (...) {
   }
   std::abort();
@@ -91,7 +91,7 @@ void beforeLibraries() {
 
 namespace {
 
-std::string namesOf(const CLI::App& app) {
+std::string commandNames(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   return fmt::format("{}", fmt::join(names, ", "));
@@ -242,7 +242,7 @@ int run(int argc, char** argv) {
       std::vector<std::string> names;
       for (const CLI::App* shown : shownCommands(app)) names.push_back(shown->get_name());
       printMessage("unknown subcommand '{}'{}; expected one of {}", argv[1], didYouMean(argv[1], names),
-                   namesOf(app));
+                   commandNames(app));
       return 2;
     }
     if (argc > 1 && argv[1][0] == '-' && app.get_subcommands().empty() && error.get_exit_code() != 0) {

@@ -66,7 +66,7 @@ std::unique_ptr<GridSource> inOrderOf(const Manifest& series, const DataSource& 
   return order.empty() ? nullptr : reordered(*grid, std::move(order));
 }
 
-std::filesystem::path temporaryFolder(const AddStepOptions& options) {
+std::filesystem::path temporaryFolderOfStep(const AddStepOptions& options) {
   return options.temporary_folder.empty() ? folderOf(options.cache) : options.temporary_folder;
 }
 
@@ -218,8 +218,8 @@ class StepAddition {
     if (options_.check_disk_space)
       checkDiskSpace(
           diskNeedsOfAdding(cache_.manifest().splats, scalars_.size(), minValueRecordBytes(scalars_.size())),
-          options_.cache, temporaryFolder(options_));
-    scratch_ = std::make_unique<ScratchFolder>(newScratch(options_.cache, temporaryFolder(options_)),
+          options_.cache, temporaryFolderOfStep(options_));
+    scratch_ = std::make_unique<ScratchFolder>(newScratch(options_.cache, temporaryFolderOfStep(options_)),
                                                ScratchFolder::Folder::kMake);
   }
 
@@ -263,7 +263,7 @@ class StepAddition {
     options.precision = precisionOf(cache_.manifest());
     options.memory_bytes = options_.memory_bytes;
     options.threads = options_.threads;
-    options.temporary_folder = temporaryFolder(options_);
+    options.temporary_folder = temporaryFolderOfStep(options_);
     options.given_folders = options_.given_folders;
     options.title = cache_.seriesManifest().title;
     options.time = report_.time;
@@ -333,7 +333,7 @@ class SetsAddition {
     const CacheLock lock(lock_, set);
     AddStepOptions options = options_;
     options.cache = lock.cache();
-    options.temporary_folder = temporaryFolder(options_);
+    options.temporary_folder = temporaryFolderOfStep(options_);
     const Series series = CacheReader(options.cache).series();
     options.expect_new_geometry =
         series.geometries() > 1 && series.first_steps.back() == series.steps.size() - 1;
@@ -382,7 +382,7 @@ std::optional<double> timeOf(const GridDescription& description, const TimeUnit&
 AddStepReport addStep(const DataSource& source, const AddStepOptions& options, Progress& progress) {
   checkWritable(options.cache, "; name a splat cache that you may change");
   RoomNeeded room{options.given_folders, "the step and its temporary files", kFullDiskHint};
-  if (room.folders.empty()) room.folders = {options.cache, temporaryFolder(options)};
+  if (room.folders.empty()) room.folders = {options.cache, temporaryFolderOfStep(options)};
   const WatchedFiles files(source.description().files);
   return room.during([&] {
     prepareSets(options.cache);

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-uint64_t bytesOf(const std::vector<FileReport>& files) {
+uint64_t sizeOfFiles(const std::vector<FileReport>& files) {
   uint64_t bytes = 0;
   for (const FileReport& file : files) bytes += file.bytes;
   return bytes;
@@ -144,7 +144,7 @@ ConvertedSteps SharedSteps::convertPart(const Start& start) const {
       const AddStepReport added = addStep(*source, options, progress_);
       last = added.time;
       options.expect_new_geometry = added.new_geometry;
-      converted.steps.push_back({stated.has_value(), added.new_geometry, bytesOf(added.files),
+      converted.steps.push_back({stated.has_value(), added.new_geometry, sizeOfFiles(added.files),
                                  source->description().files, added.warnings});
     }
   } catch (const Interrupted&) {

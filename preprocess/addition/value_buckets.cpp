@@ -152,7 +152,7 @@ constexpr size_t kGatheredBytes = 32 << 10;
 
 /// Memory for a brick of a bucket while it is built: its records and their places, its geometry, its encoded
 /// values, and the values merged from it for its parent.
-uint64_t bytesOf(const Brick& brick, size_t variables) {
+uint64_t bytesToBuild(const Brick& brick, size_t variables) {
   const uint64_t splats = brick.splats;
   const uint64_t merged =
       std::min(splats, uint64_t{1} << (3 * (kLatticeBits - 1))) * sizeof(SplatScalar) * variables;
@@ -167,7 +167,7 @@ ValueBuckets::ValueBuckets(std::span<const Brick> bricks, const ConversionOrder&
     : begins_{0} {
   uint64_t bytes = 0;
   for (uint32_t position = 0; position < order.size(); ++position) {
-    const uint64_t of_brick = bytesOf(bricks[order[position]], variables);
+    const uint64_t of_brick = bytesToBuild(bricks[order[position]], variables);
     if (position > begins_.back() && bytes + of_brick > most_bytes) {
       begins_.push_back(position);
       bytes = 0;

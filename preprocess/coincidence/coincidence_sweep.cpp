@@ -14,9 +14,9 @@ namespace {
 
 // Orthogonal, of length one, and along no axis, plane or diagonal that a grid would choose: the faces of a
 // block do not fall together under them.
-const glm::dvec3 kAlong = glm::normalize(glm::dvec3(0.8414709848, 0.3472963553, 0.4142135624));
+const glm::dvec3 kSweepAxis = glm::normalize(glm::dvec3(0.8414709848, 0.3472963553, 0.4142135624));
 const glm::dvec3 kAcross =
-    glm::normalize(glm::cross(kAlong, glm::dvec3(0.2360679775, 0.7320508076, -0.5772156649)));
+    glm::normalize(glm::cross(kSweepAxis, glm::dvec3(0.2360679775, 0.7320508076, -0.5772156649)));
 
 /// How far from a node another may lie that is the same point. Half the spacing would let two neighbours
 /// meet at a third node between them.
@@ -34,7 +34,7 @@ double slackOf(const SweptNode& node) {
 }  // namespace
 
 SeamPosition seamPosition(const glm::dvec3& position) {
-  return {glm::dot(kAlong, position), glm::dot(kAcross, position)};
+  return {glm::dot(kSweepAxis, position), glm::dot(kAcross, position)};
 }
 
 double coordinateRounding(const glm::dvec3& position, int coordinate_bytes) {

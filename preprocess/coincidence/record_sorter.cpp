@@ -22,7 +22,7 @@ constexpr size_t kRecordsAhead = 12;     // to prefetch
 constexpr size_t kEntriesOfBucket = 8;  // on average; a bucket takes a size_t, so an entry takes another byte
 constexpr size_t kFewEntries = 1024;    // sorted without buckets
 constexpr size_t kCacheLineDoubles = 8;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 void prefetch(const double* record, size_t size) {
   for (size_t n = 0; n < size; n += kCacheLineDoubles) __builtin_prefetch(record + n);
@@ -167,8 +167,8 @@ void RecordSorter::visitInMemory(const std::vector<Entry>& entries, double from,
   const auto placeOf = [&](double along) {
     return static_cast<size_t>(std::ranges::lower_bound(entries, along, {}, &Entry::along) - entries.begin());
   };
-  const size_t end = to < kInfinity ? placeOf(to) : entries.size();
-  for (size_t n = from > -kInfinity ? placeOf(from) : 0; n < end; ++n) {
+  const size_t end = to < kUnbounded ? placeOf(to) : entries.size();
+  for (size_t n = from > -kUnbounded ? placeOf(from) : 0; n < end; ++n) {
     if (n + kRecordsAhead < end) prefetch(record(entries[n + kRecordsAhead]), record_size_);
     if (!visit(record(entries[n]))) return;
   }
@@ -182,7 +182,7 @@ RecordSorter::Run RecordSorter::write(Half& half) {
   const uint64_t begin = out.size();
   std::vector<double> block;
   sortEntries(half);
-  visitInMemory(half.entries, -kInfinity, kInfinity, [&](const double* record) {
+  visitInMemory(half.entries, -kUnbounded, kUnbounded, [&](const double* record) {
     block.insert(block.end(), record, record + record_size_);
     if (block.size() < kWriteSize) return true;
     out.append(std::span<const double>(block));
@@ -195,7 +195,7 @@ RecordSorter::Run RecordSorter::write(Half& half) {
 
 void RecordSorter::drain(const Visit& visit_one) {
   sort();
-  visit(-kInfinity, kInfinity, [&](const double* record) {
+  visit(-kUnbounded, kUnbounded, [&](const double* record) {
     visit_one(record);
     return true;
   });
@@ -252,7 +252,7 @@ RecordSorter::Run RecordSorter::partOf(const Run& run, double from, double to) c
     }
     return run.begin + low * record_size_ * sizeof(double);
   };
-  return {from > -kInfinity ? at(from) : run.begin, to < kInfinity ? at(to) : run.end};
+  return {from > -kUnbounded ? at(from) : run.begin, to < kUnbounded ? at(to) : run.end};
 }
 
 void RecordSorter::visitRuns(double from, double to, const VisitOrStop& visit) const {

@@ -173,7 +173,7 @@ ConvertReport convertScalars(const DataSource& source, ConvertOptions options, P
   return report;
 }
 
-uint64_t nodesOf(const GridDescription& description) {
+uint64_t blockNodes(const GridDescription& description) {
   uint64_t nodes = 0;
   for (const GridBlock& block : description.blocks) nodes += block.nodes();
   return nodes;
@@ -202,7 +202,7 @@ SampleScale SampleScale::of(const GridDescription& whole, const GridDescription&
   const auto of_faces = [&](const GridDescription& grid, std::span<const IndexPlane> planes) {
     return static_cast<double>(temporaryBytesOfFaces(grid, planes, options.scalars.size()));
   };
-  return {static_cast<double>(nodesOf(whole)) / static_cast<double>(nodesOf(sample)),
+  return {static_cast<double>(blockNodes(whole)) / static_cast<double>(blockNodes(sample)),
           of_faces(whole, options.planes) / of_faces(sample, {})};
 }
 

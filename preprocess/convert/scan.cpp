@@ -20,7 +20,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kNodesPerTask = 16384;
+constexpr size_t kCountedPerTask = 16384;
 constexpr size_t kPositionsAtOnce = size_t{1} << 18;  // 4 MiB of runs at most
 
 // Splats are stored in single precision, their weights in units cubed.
@@ -28,7 +28,7 @@ constexpr double kSmallestExtent = 1e-9, kLargestExtent = 1e12;
 // Splats hold variances, squares of differences of values; and they are added up.
 constexpr double kLargestRange = 1e18;
 
-void widen(GridSurvey& bounds, const NodeArrays& nodes, size_t begin, size_t end) {
+void widenBounds(GridSurvey& bounds, const NodeArrays& nodes, size_t begin, size_t end) {
   for (size_t n = begin; n < end; ++n) {
     if (nodes.blank[n]) continue;
     const glm::dvec3 position(nodes.x[n], nodes.y[n], nodes.z[n]);
@@ -57,14 +57,14 @@ class PartCounter {
   void add(size_t positions, const Gather& gather) {
     for (size_t begin = 0; begin < positions; begin += kPositionsAtOnce) {
       const size_t end = std::min(positions, begin + kPositionsAtOnce);
-      std::vector<VoxelRuns> gathered((end - begin + kNodesPerTask - 1) / kNodesPerTask,
+      std::vector<VoxelRuns> gathered((end - begin + kCountedPerTask - 1) / kCountedPerTask,
                                       VoxelRuns(counts_.level()));
       parallelInvoke([&] { addGathered(); },
                      [&] {
                        parallelFor(size_t{0}, gathered.size(), [&](size_t task) {
                          const TraceScope trace("count nodes");
-                         const size_t first = begin + task * kNodesPerTask;
-                         gather(gathered[task], first, std::min(end, first + kNodesPerTask));
+                         const size_t first = begin + task * kCountedPerTask;
+                         gather(gathered[task], first, std::min(end, first + kCountedPerTask));
                        });
                      });
       gathered_ = std::move(gathered);
@@ -129,10 +129,10 @@ GridSurvey surveyGrid(const NodeReader& reader, const SlabBuffers& slabs, const 
     const size_t count = loaded->nodes.x.size();
     // The smallest and the largest do not depend on how the work is divided.
     GridSurvey of_slab = parallelReduce(
-        tbb::blocked_range<size_t>(0, count, kNodesPerTask), none,
+        tbb::blocked_range<size_t>(0, count, kCountedPerTask), none,
         [&](const tbb::blocked_range<size_t>& range, GridSurvey bounds) {
           const TraceScope trace("scan nodes");
-          widen(bounds, loaded->nodes, range.begin(), range.end());
+          widenBounds(bounds, loaded->nodes, range.begin(), range.end());
           return bounds;
         },
         unitedSurvey);

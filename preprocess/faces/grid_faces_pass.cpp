@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-std::array<uint64_t, 3> sizeOf(const GridBlock& block) {
+std::array<uint64_t, 3> nodesAlong(const GridBlock& block) {
   return {block.ni, block.nj, block.nk};
 }
 
@@ -27,7 +27,7 @@ uint64_t partsOf(const IndexPlane& plane, const GridDescription& grid, uint32_t 
 std::vector<GridFace> facesOf(const GridDescription& grid, std::span<const IndexPlane> planes) {
   std::vector<GridFace> faces;
   for (uint32_t block = 0; block < grid.blocks.size(); ++block) {
-    const std::array<uint64_t, 3> size = sizeOf(grid.blocks[block]);
+    const std::array<uint64_t, 3> size = nodesAlong(grid.blocks[block]);
     if (std::any_of(size.begin(), size.end(), [](uint64_t n) { return n < 2; })) continue;
     const auto add = [&](int axis, FaceSide side, uint64_t index) {
       const auto [u, v] = kFaceAxes[static_cast<size_t>(axis)];
@@ -242,7 +242,7 @@ void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes
     uint64_t last = 0;
     for (uint32_t n = 0; n < grid.blocks.size(); ++n)
       if (plane.block.value_or(n) == n)
-        last = std::max(last, (sizeOf(grid.blocks[n])[a] - 1) / partsOf(plane, grid, n));
+        last = std::max(last, (nodesAlong(grid.blocks[n])[a] - 1) / partsOf(plane, grid, n));
     if (plane.index > last)
       throw Error("--surface: {} {}={}; expected 0 to {}",
                   plane.block ? fmt::format("block {} has no", *plane.block + 1) : "no block has", axis,

@@ -17,7 +17,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kCellsPerTask = 512;
+constexpr size_t kGatheredPerTask = 512;
 
 uint64_t cornersDrawn(const MeshCells& cells) {
   uint64_t corners = 0;
@@ -172,7 +172,7 @@ void CornerGather::gatherByPages(std::vector<MeshRange>& ranges, UsedBeside& use
         ranges[done].count -= begin;
         return false;
       }
-      parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+      parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kGatheredPerTask),
                   [&](const tbb::blocked_range<size_t>& part) {
                     for (size_t n = part.begin(); n < part.end(); ++n) {
                       for (size_t at = cells.corner_begin[n]; at < cells.corner_begin[n + 1]; ++at) {

@@ -208,7 +208,7 @@ void FaceMatcher::forget() {
 
 namespace {
 
-constexpr size_t kCellsPerTask = 256, kManyCorners = 64;
+constexpr size_t kMatchedPerTask = 256, kManyCorners = 64;
 constexpr FaceCorners kCollapsed{UINT64_MAX, UINT64_MAX, UINT64_MAX};
 
 bool areDifferent(std::span<const uint64_t> corners) {
@@ -299,7 +299,7 @@ void FaceList::assign(const GatheredCells& cells) {
   corners.resize(begins_.back());
   places.resize(begins_.back());
   std::atomic<bool> any_collapsed = false;
-  parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+  parallelFor(tbb::blocked_range<size_t>(0, cells.size(), kMatchedPerTask),
               [&](const tbb::blocked_range<size_t>& part) {
                 bool collapsed = false;
                 for (size_t n = part.begin(); n < part.end(); ++n) collapsed |= assignCell(cells, n);

@@ -138,7 +138,7 @@ std::vector<MeshRange> sampleOf(const std::vector<MeshRange>& ranges) {
   return sample;
 }
 
-uint64_t facesOfCell(const MeshCells& cells, size_t n) {
+uint64_t countFaces(const MeshCells& cells, size_t n) {
   const std::span<const uint32_t> faces = facesOf(cells.shapes[n], cells.facesOfCell(n));
   uint64_t count = 0;
   for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}) ++count;
@@ -162,7 +162,7 @@ Sample sampled(const MeshReader& reader, const GatherJob& job) {
       ++sample.drawn;
       sample.corners += cells.cornersOfCell(n).size();
       sample.face_words += cells.facesOfCell(n).size();
-      sample.faces += facesOfCell(cells, n);
+      sample.faces += countFaces(cells, n);
     }
   });
   return sample;

@@ -20,7 +20,7 @@ struct Points {
   std::vector<std::vector<float>> scalars;  // [scalar][point]; empty where cells have them
 };
 
-uint64_t bytesOf(const MeshReader& mesh) {
+uint64_t pointBytes(const MeshReader& mesh) {
   const uint64_t values = mesh.centring() == Centring::kNode ? mesh.scalars() : 0;
   return mesh.points() * (3 * sizeof(double) + values * sizeof(float));
 }
@@ -196,7 +196,7 @@ void addCells(const MeshCells& cells, uint64_t first_point, const Points& points
 
 std::unique_ptr<GridSource> latticeOf(const MeshReader& mesh, uint64_t nodes, uint64_t memory_bytes,
                                       Progress& progress) {
-  const uint64_t needed = bytesOf(mesh);
+  const uint64_t needed = pointBytes(mesh);
   if (needed > memory_bytes) return nullptr;
   mesh.prepare(memory_bytes - needed, progress);
   progress.begin("sampling", mesh.points() + mesh.cells(), "points and cells");

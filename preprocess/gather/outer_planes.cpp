@@ -15,7 +15,7 @@ namespace {
 // Faces against each other: the cosine of their normals, and how far the centre of one is from the plane of
 // the other, in the lengths of that. The sides of a sharp edge are neither.
 constexpr double kOpposite = -0.98, kApart = 0.05;
-constexpr size_t kMaxCompared = 256;  // at one number, pair by pair
+constexpr size_t kMaxComparedSides = 256;  // at one number, pair by pair
 
 glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
@@ -50,7 +50,7 @@ bool lieAgainst(const OuterPlane& a, const OuterPlane& b, double shares) {
 
 /// Marks the sides that lie against another one; all where very many meet.
 void markClosed(std::span<Side> sides) {
-  if (sides.size() > kMaxCompared) {
+  if (sides.size() > kMaxComparedSides) {
     for (Side& side : sides) side.closed = true;
     return;
   }
@@ -144,15 +144,15 @@ namespace {
 constexpr uint64_t kFacesOfCell = 6;
 constexpr size_t kMaxCorners = PointBorders::kMaxPlanesOfFace;  // of a polyhedron's the first
 
-struct FaceRecord {
+struct PlaneRecord {
   std::array<uint64_t, kMaxCorners> corners;  // those of the face, then the cell's others
   uint32_t of_face, count;
   glm::dvec3 inward, centre;
 };
-static_assert(sizeof(FaceRecord) == 120);
+static_assert(sizeof(PlaneRecord) == 120);
 
-FaceRecord recordOf(const GatheredCells& cells, const HalfFace& face) {
-  FaceRecord record{};
+PlaneRecord planeRecordOf(const GatheredCells& cells, const HalfFace& face) {
+  PlaneRecord record{};
   const std::span<const uint64_t> corners = cells.cornersOfCell(face.cell);
   record.inward = face.inward;
   record.centre = face.centre;
@@ -184,21 +184,21 @@ FaceRecord recordOf(const GatheredCells& cells, const HalfFace& face) {
 
 PointBorders::PointBorders(uint64_t points, uint64_t range_points, uint64_t cells, uint64_t memory_bytes,
                            const ScratchFiles& scratch)
-    : faces_(sizeof(FaceRecord), cells * kFacesOfCell, memory_bytes / 2, scratch),
+    : faces_(sizeof(PlaneRecord), cells * kFacesOfCell, memory_bytes / 2, scratch),
       planes_((points + range_points - 1) / range_points, range_points, memory_bytes / 2, scratch) {}
 
 uint64_t PointBorders::waitingBytes(uint64_t cells) {
-  return FaceMatcher::waitingBytes(sizeof(FaceRecord), cells * kFacesOfCell);
+  return FaceMatcher::waitingBytes(sizeof(PlaneRecord), cells * kFacesOfCell);
 }
 
 size_t PointBorders::faceBytes() {
-  return sizeof(FaceRecord);
+  return sizeof(PlaneRecord);
 }
 
 void PointBorders::add(const GatheredCells& cells) {
   list_.assign(cells);
   faces_.add(list_.corners, {[&](size_t n, std::span<std::byte> to) {
-               const FaceRecord record = recordOf(cells, list_.face(cells, n));
+               const PlaneRecord record = planeRecordOf(cells, list_.face(cells, n));
                std::memcpy(to.data(), &record, sizeof record);
              }});
 }
@@ -208,7 +208,7 @@ void PointBorders::finish(const Progress& progress) {
   uint64_t face = 0;
   faces_.finish([](std::span<const std::byte>, std::span<const std::byte>) {},
                 [&](const FaceCorners&, std::span<const std::byte> bytes) {
-                  FaceRecord record;
+                  PlaneRecord record;
                   std::memcpy(static_cast<void*>(&record), bytes.data(), sizeof record);
                   for (uint32_t n = 0; n < record.count; ++n)
                     planes_.add(record.corners[n], {record.inward, record.centre, n < record.of_face}, face);

@@ -17,7 +17,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kSampledChunks = 4, kSampledCells = 4096;
+constexpr size_t kTriedChunks = 4, kSampledCells = 4096;
 // Elements are apart if more than kCoincidentShare of the points have the position of another point, and the cells fall
 // into at least kMinElements parts of at most kMaxElement cells on the average (an element of order 8 has 8 x 8 x 8).
 constexpr double kCoincidentShare = 1.0 / 32;
@@ -105,7 +105,7 @@ void add(const MeshReader& reader, const LoadedCells& loaded, Counts& counts) {
 /// stepOf() the points, or nullopt if elements are not apart.
 std::optional<double> stepOfElementsApart(const MeshReader& reader) {
   const std::vector<MeshRange> chunks = reader.cellRanges();
-  const size_t count = std::min(chunks.size(), kSampledChunks);
+  const size_t count = std::min(chunks.size(), kTriedChunks);
   std::vector<MeshRange> sample;
   for (size_t n = 0; n < count; ++n) {
     sample.push_back(chunks[n * chunks.size() / count]);

@@ -17,7 +17,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kCellsPerTask = 256;
+constexpr size_t kSummedPerTask = 256;
 constexpr size_t kMomentBytes = size_t{16} << 20;  // of a batch of cells
 constexpr size_t kCellsPerRead = 8192;
 
@@ -175,7 +175,7 @@ void PointSums::accumulate(const GatheredCells& cells, const PointRange& range) 
     while (end < cells.size() && cells.corner_begin[end + 1] - first_corner <= most_corners) ++end;
     const size_t corners = cells.corner_begin[end] - first_corner;
     moments_.resize(std::max(moments_.size(), corners * stride));
-    parallelFor(tbb::blocked_range<size_t>(begin, end, kCellsPerTask),
+    parallelFor(tbb::blocked_range<size_t>(begin, end, kSummedPerTask),
                 [&](const tbb::blocked_range<size_t>& part) {
                   const size_t from = cells.corner_begin[part.begin()] - first_corner;
                   momentsOf(cells, part.begin(), part.end(), fields_, scratch.local(),

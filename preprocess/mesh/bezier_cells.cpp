@@ -13,14 +13,15 @@
 namespace curvisplat {
 namespace {
 
-using Place = std::array<uint8_t, 3>;
+using LatticePlace = std::array<uint8_t, 3>;
 
 double factorial(int n) {
   return n < 2 ? 1 : n * factorial(n - 1);
 }
 
 /// Bernstein's polynomial of a control point at a node, over a simplex of these axes.
-double bernstein(const std::vector<size_t>& axes, int order, const Place& control, const Place& node) {
+double bernstein(const std::vector<size_t>& axes, int order, const LatticePlace& control,
+                 const LatticePlace& node) {
   int rest = order, rest_of_node = order;
   double value = factorial(order);
   const auto multiply = [&](int power, int part) {
@@ -38,14 +39,14 @@ double bernstein(const std::vector<size_t>& axes, int order, const Place& contro
 }  // namespace
 
 BezierCell::BezierCell(CellKind shape, CellCurve curve) {
-  const std::vector<Place> places = nodesOf(shape, curve);
+  const std::vector<LatticePlace> places = nodesOf(shape, curve);
   const std::array<uint8_t, 3> orders = ordersOf(curve);
   nodes_ = places.size();
   const auto addPass = [&](const std::vector<size_t>& axes) {
     Pass& pass = passes_.emplace_back();
-    for (const Place& node : places) {
+    for (const LatticePlace& node : places) {
       for (size_t n = 0; n < places.size(); ++n) {
-        Place elsewhere = places[n];
+        LatticePlace elsewhere = places[n];
         for (const size_t axis : axes) elsewhere[axis] = node[axis];
         if (elsewhere != node) continue;
         if (const double weight = bernstein(axes, orders[axes[0]], places[n], node); weight != 0)

@@ -16,7 +16,7 @@
 namespace curvisplat {
 namespace {
 
-using Place = std::array<uint8_t, 3>;
+using NodePlace = std::array<uint8_t, 3>;
 
 constexpr size_t kPoints = 3;  // along a part and an axis
 constexpr std::array<double, kPoints> kAt{0.11270166537925831, 0.5, 0.88729833462074169},
@@ -132,12 +132,13 @@ class HexahedronVolumes final : public CurvedVolumes {
   }
 
   const std::array<uint8_t, 3> orders_;
-  const std::vector<Place> places_;
+  const std::vector<NodePlace> places_;
   std::array<std::vector<std::array<double, 2>>, 3> basis_;  // [axis][point][node]: value, slope
 };
 
 /// A node's polynomial: its value, and its slopes along i, j and k in units of the lattice.
-std::array<double, 4> polynomialOf(CellKind shape, CellCurve curve, const Place& node, const glm::dvec3& at) {
+std::array<double, 4> polynomialOf(CellKind shape, CellCurve curve, const NodePlace& node,
+                                   const glm::dvec3& at) {
   const int order = curve.order;
   if (shape == CellKind::kHexahedron) {
     std::array<std::array<double, 2>, 3> along;
@@ -298,8 +299,8 @@ class TabulatedVolumes final : public CurvedVolumes {
   void addCentres(CellKind shape) {
     for (size_t node = nodes_; node < places_.size(); ++node) {
       Centre centre{node, {}};
-      const Place& at = places_[node];
-      const bool body = shape == CellKind::kHexahedron && at == Place{1, 1, 1};
+      const NodePlace& at = places_[node];
+      const bool body = shape == CellKind::kHexahedron && at == NodePlace{1, 1, 1};
       for (size_t n = 0; n < nodes_; ++n) {
         bool on_face = true;
         for (size_t axis = 0; axis < 3; ++axis) on_face &= at[axis] == 1 || at[axis] == places_[n][axis];
@@ -322,7 +323,7 @@ class TabulatedVolumes final : public CurvedVolumes {
       const auto add = [&](std::array<size_t, 4> of) {
         std::array<glm::dvec3, 4> at;
         for (size_t n = 0; n < 4; ++n) {
-          const Place& place = places_[corners[of[n]]];
+          const NodePlace& place = places_[corners[of[n]]];
           at[n] = {place[0], place[1], place[2]};
         }
         addTetrahedron(part, at, shape, whole);
@@ -348,14 +349,14 @@ class TabulatedVolumes final : public CurvedVolumes {
     for (const RulePoint& point : rule_) {
       glm::dvec3 place(0.0);
       for (size_t n = 0; n < at.size(); ++n) place += point.at[n] * at[n];
-      for (const Place& node : places_) polynomials_.push_back(polynomialOf(shape, whole, node, place));
+      for (const NodePlace& node : places_) polynomials_.push_back(polynomialOf(shape, whole, node, place));
     }
   }
 
   const std::vector<RulePoint> rule_;
   const size_t corners_, nodes_;
   const bool complete_;
-  std::vector<Place> places_;  // of the complete cell
+  std::vector<NodePlace> places_;  // of the complete cell
   size_t parts_ = 0, own_tetrahedra_ = 0;
   std::vector<Centre> centres_;
   std::vector<Tetrahedron> tetrahedra_;

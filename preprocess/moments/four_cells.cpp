@@ -43,7 +43,7 @@ CURVISPLAT_INLINE void setSixVolumes(const Four3& a, const Four3& b, const Four3
 }
 
 /// A vertex of pieces: where it is, and the fields there.
-struct Vertex {
+struct FourVertices {
   Four3 at;
   Squares squares;
   Four values[kMaxFields];
@@ -55,8 +55,9 @@ struct PieceWeights {
 };
 
 /// addPiece() of cell_moments.cpp, in its order of operations.
-CURVISPLAT_INLINE void addPiece(const PieceWeights& weights, const Vertex& a, const Vertex& b,
-                                const Vertex& f, size_t fields, Four* sums) {
+CURVISPLAT_INLINE void addFourPieces(const PieceWeights& weights, const FourVertices& a,
+                                     const FourVertices& b, const FourVertices& f, size_t fields,
+                                     Four* sums) {
   const Four3 s = plus(plus(a.at, b.at), f.at);
   const Four first = weights.first, second = weights.second;
   const Squares of_sum = squaresOf(s);
@@ -78,7 +79,7 @@ CURVISPLAT_INLINE void addPiece(const PieceWeights& weights, const Vertex& a, co
 }
 
 /// shift() of cell_moments.cpp, by the corner and its values, negative.
-CURVISPLAT_INLINE void shiftTo(const Vertex& corner, size_t fields, Four* m) {
+CURVISPLAT_INLINE void shiftTo(const FourVertices& corner, size_t fields, Four* m) {
   const Four volume = m[0], first[3] = {m[1], m[2], m[3]};
   const Four by[3] = {-corner.at.x, -corner.at.y, -corner.at.z};
   constexpr size_t kRow[6] = {0, 0, 1, 0, 1, 2}, kColumn[6] = {0, 1, 1, 2, 2, 2};
@@ -97,7 +98,7 @@ CURVISPLAT_INLINE void shiftTo(const Vertex& corner, size_t fields, Four* m) {
 }
 
 /// The corners about the cells' centres, which it returns, and the values about their means.
-CURVISPLAT_INLINE Four3 takeCorners(std::span<const CellView> cells, size_t fields, Vertex* out) {
+CURVISPLAT_INLINE Four3 takeCorners(std::span<const CellView> cells, size_t fields, FourVertices* out) {
   const size_t corners = cells[0].corners.size();
   const auto count = static_cast<double>(corners);
   Four3 centre{};
@@ -138,14 +139,14 @@ CURVISPLAT_VECTOR_CLONES bool dualMomentsOfFour(std::span<const CellView> cells,
                                                 std::span<double> out) {
   CURVISPLAT_CHECK(cells.size() == kCellsAtOnce && isTakenAtOnce(cells[0].shape, fields));
   const size_t corners = cells[0].corners.size(), stride = momentCount(fields);
-  Vertex vertices[kMaxCorners];
+  FourVertices vertices[kMaxCorners];
   takeCorners(cells, fields, vertices);
   Four sums[kMaxCorners][kMaxMoments] = {};
   const std::span<const uint32_t> faces = facesOf(cells[0].shape, {});
   for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}) {
     const std::span<const uint32_t> face = faces.subspan(at + 1, faces[at]);
     const double share = 1 / static_cast<double>(face.size());
-    Vertex f{};
+    FourVertices f{};
     for (const uint32_t corner : face) {
       f.at = plus(f.at, times(share, vertices[corner].at));
       for (size_t field = 0; field < fields; ++field)
@@ -159,13 +160,13 @@ CURVISPLAT_VECTOR_CLONES bool dualMomentsOfFour(std::span<const CellView> cells,
       volume /= 12.0;
       for (size_t lane = 0; lane < kCellsAtOnce; ++lane)
         if (!(volume[lane] > 0)) return false;
-      Vertex m;
+      FourVertices m;
       m.at = times(0.5, plus(vertices[a].at, vertices[b].at));
       m.squares = squaresOf(m.at);
       for (size_t field = 0; field < fields; ++field)
         m.values[field] = 0.5 * (vertices[a].values[field] + vertices[b].values[field]);
       const PieceWeights weights{volume, volume / 4.0, volume / 20.0};
-      for (const uint32_t end : {a, b}) addPiece(weights, vertices[end], m, f, fields, sums[end]);
+      for (const uint32_t end : {a, b}) addFourPieces(weights, vertices[end], m, f, fields, sums[end]);
     }
   }
   for (size_t n = 0; n < corners; ++n) {
@@ -180,14 +181,14 @@ CURVISPLAT_VECTOR_CLONES bool dualMomentsOfFour(std::span<const CellView> cells,
 
 CURVISPLAT_VECTOR_CLONES void setBodiesOfFour(std::span<const CellView> cells, std::span<CellBody> out) {
   CURVISPLAT_CHECK(cells.size() == kCellsAtOnce && isTakenAtOnce(cells[0].shape, 0));
-  Vertex vertices[kMaxCorners];
+  FourVertices vertices[kMaxCorners];
   const Four3 centre = takeCorners(cells, 0, vertices);
   Four sums[momentCount(0)] = {};
   const std::span<const uint32_t> faces = facesOf(cells[0].shape, {});
   for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}) {
     const std::span<const uint32_t> face = faces.subspan(at + 1, faces[at]);
     const auto count = static_cast<double>(face.size());
-    Vertex f{};
+    FourVertices f{};
     for (const uint32_t corner : face) f.at = plus(f.at, vertices[corner].at);
     f.at = {f.at.x / count, f.at.y / count, f.at.z / count};
     f.squares = squaresOf(f.at);
@@ -196,7 +197,7 @@ CURVISPLAT_VECTOR_CLONES void setBodiesOfFour(std::span<const CellView> cells, s
       Four volume;
       setSixVolumes(vertices[a].at, vertices[b].at, f.at, volume);
       volume /= 6.0;
-      addPiece({volume, volume / 4.0, volume / 20.0}, vertices[a], vertices[b], f, 0, sums);
+      addFourPieces({volume, volume / 4.0, volume / 20.0}, vertices[a], vertices[b], f, 0, sums);
     }
   }
   for (size_t lane = 0; lane < kCellsAtOnce; ++lane) {

@@ -11,7 +11,7 @@ namespace {
 
 using std::numbers::pi;
 
-bool inUnitInterval(double x) {
+bool isWithinGrid(double x) {
   return x >= 0 && x <= 1;
 }
 
@@ -34,7 +34,7 @@ class Spectral : public Scene {
   }
   std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
     const double y = world.y - kWave * std::sin(2 * pi * world.x);
-    if (!inUnitInterval(world.x) || !inUnitInterval(y) || !inUnitInterval(world.z)) return std::nullopt;
+    if (!isWithinGrid(world.x) || !isWithinGrid(y) || !isWithinGrid(world.z)) return std::nullopt;
     return glm::dvec3(even(world.x), even(y), even(world.z));
   }
   double scalar(const glm::dvec3& p) const override { return waves(p); }
@@ -79,7 +79,7 @@ class Dome : public Scene {
   std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
     const double radius = glm::length(world);
     const double stretched = (radius - kInner) / (kOuter - kInner);
-    if (!inUnitInterval(stretched) || world.z < 0) return std::nullopt;
+    if (!isWithinGrid(stretched) || world.z < 0) return std::nullopt;
     double angle = std::atan2(world.y, world.x);
     if (angle < 0) angle += 2 * pi;
     return glm::dvec3(angle / (2 * pi), std::log1p(stretched * growth_) / clustering_,
@@ -112,10 +112,10 @@ class GlobeFace : public Scene {
   std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
     const double w = (glm::length(world) - kInner) / (kOuter - kInner);
     const double along = glm::dot(world, axis_);
-    if (!inUnitInterval(w) || along <= 0) return std::nullopt;
+    if (!isWithinGrid(w) || along <= 0) return std::nullopt;
     const double u = 0.5 + std::atan(glm::dot(world, right_) / along) / (0.5 * pi);
     const double v = 0.5 + std::atan(glm::dot(world, up_) / along) / (0.5 * pi);
-    if (!inUnitInterval(u) || !inUnitInterval(v)) return std::nullopt;
+    if (!isWithinGrid(u) || !isWithinGrid(v)) return std::nullopt;
     return glm::dvec3(u, v, w);
   }
   double scalar(const glm::dvec3& p) const override { return waves(p); }
@@ -155,7 +155,7 @@ class DuctPart : public Scene {
   }
   std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
     const double x = world.x - begin_, v = world.y - bend(world.x);
-    if (!inUnitInterval(x) || !inUnitInterval(v) || !inUnitInterval(world.z)) return std::nullopt;
+    if (!isWithinGrid(x) || !isWithinGrid(v) || !isWithinGrid(world.z)) return std::nullopt;
     return glm::dvec3(std::log1p(x * growth_) / clustering_, v, world.z);
   }
   double scalar(const glm::dvec3& p) const override { return waves(p); }

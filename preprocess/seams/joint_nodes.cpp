@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kSimilar = 0.5;    // cosine: of one direction
 constexpr double kOpposite = -0.5;  // of two that close one another
-constexpr double kMin = 0.1;        // what must be left of a direction at right angles to the others
+constexpr double kMinSine = 0.1;    // what must be left of a direction at right angles to the others
 
 }  // namespace
 
@@ -74,7 +74,7 @@ LayeredBorder OpenBorders::of(const Splat& merged, std::span<const Layer> layers
   for (const Open& border : open) {
     glm::dvec3 axis = glm::normalize(border.along);
     for (size_t n = 0; n < count; ++n) axis -= glm::dot(axis, axes[n]) * axes[n];
-    if (count == 3 || glm::length(axis) <= kMin) continue;
+    if (count == 3 || glm::length(axis) <= kMinSine) continue;
     if (border.face) faces |= 1u << count;
     axes[count++] = glm::normalize(axis);
   }

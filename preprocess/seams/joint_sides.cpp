@@ -18,11 +18,11 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kAlong = 0.7;       // cosine of directions that are about the same
-constexpr double kMin = 1.0 / 64;    // less growth becomes none
-constexpr double kTowards = 0.5;     // cosine
-constexpr size_t kFace = 2;          // of a row: the cell at the face, of a node on it
-constexpr double kFaceOfHalf = 0.5;  // from the middle of a half cell, in its length
+constexpr double kAlong = 0.7;           // cosine of directions that are about the same
+constexpr double kMinGrowth = 1.0 / 64;  // less growth becomes none
+constexpr double kTowards = 0.5;         // cosine
+constexpr size_t kFace = 2;              // of a row: the cell at the face, of a node on it
+constexpr double kFaceOfHalf = 0.5;      // from the middle of a half cell, in its length
 
 /// Up to three axes at right angles, with the growth along each.
 class GrownAxes {
@@ -41,7 +41,7 @@ void GrownAxes::add(const glm::dvec3& axis, double growth) {
   glm::dvec3 left = axis;
   for (size_t n = 0; n < count_; ++n) left -= glm::dot(left, axes_[n]) * axes_[n];
   const double length = glm::length(left);
-  if (count_ == axes_.size() || std::abs(growth) < kMin || !(length > kAlong)) return;
+  if (count_ == axes_.size() || std::abs(growth) < kMinGrowth || !(length > kAlong)) return;
   axes_[count_] = left / length;
   growth_[count_++] = growth;
 }

@@ -38,7 +38,7 @@ struct CellCounts {
   double volume = 0;
 };
 
-CellCounts sum(CellCounts a, const CellCounts& b) {
+CellCounts sumOfCounts(CellCounts a, const CellCounts& b) {
   a.cells += b.cells;
   a.degenerate += b.degenerate;
   a.right += b.right;
@@ -93,7 +93,7 @@ CellCounts countCells(const GridBlock& block, const LoadedSlab& loaded) {
         }
         return counts;
       },
-      sum);
+      sumOfCounts);
 }
 
 }  // namespace
@@ -156,7 +156,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
   SlabStream cells(coordinates, slab_bytes, kCornerHalo);
   while (const LoadedSlab* loaded = cells.next()) {
     const uint32_t block = loaded->slab.block;
-    counts[block] = sum(counts[block], countCells(description.blocks[block], *loaded));
+    counts[block] = sumOfCounts(counts[block], countCells(description.blocks[block], *loaded));
     progress.advance(loaded->nodes.x.size());
   }
   for (size_t b = 0; b < counts.size(); ++b) {

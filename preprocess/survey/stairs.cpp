@@ -15,7 +15,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kWindowNodes = 1 << 18;
+constexpr uint64_t kStairNodesAtOnce = 1 << 18;
 
 /// Whether the cells around a node, by its number in bits along i, j, k, end at no plane: some are missing, and the others are not
 /// those on one side of it.
@@ -70,8 +70,8 @@ std::vector<Stairs> stairsOf(const GridSource& source, std::vector<uint32_t> sca
   std::erase_if(scalars, [&](uint32_t n) { return description.scalars.at(n).centring != Centring::kNode; });
   scalars.resize(std::min(scalars.size(), kMaxScalars));
   const NodeReader reader = NodeReader::ofAnyValue(source, scalars, blank_value);
-  SlabStream stream(reader, kWindowNodes * slabBytesPerNode(scalars.size()),
-                    cutIntoSlabs(description.blocks, kWindowNodes, kNodeHalo));
+  SlabStream stream(reader, kStairNodesAtOnce * slabBytesPerNode(scalars.size()),
+                    cutIntoSlabs(description.blocks, kStairNodesAtOnce, kNodeHalo));
   std::vector<Stairs> of_blocks(description.blocks.size());
   while (const LoadedSlab* loaded = stream.next()) {
     const Slab& slab = loaded->slab;

@@ -16,7 +16,7 @@ namespace curvisplat {
 namespace {
 
 constexpr int kColumns = 3, kColumnWidth = 400, kLine = 22, kMargin = 10;
-constexpr int kBarBegin = 180, kBarWidth = 200, kBarHeight = 16;
+constexpr int kBarBegin = 180, kStripWidth = 200, kStripHeight = 16;
 constexpr double kFontSize = 13;
 
 struct Destroy {
@@ -74,7 +74,7 @@ Image colourMapSheet() {
   for (size_t n = 0; n < list.size(); ++n) {
     const auto [x, y] = cornerOf(n);
     selectFont(cairo.get(), list[n].heading ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_move_to(cairo.get(), x, y + kBarHeight - 3);
+    cairo_move_to(cairo.get(), x, y + kStripHeight - 3);
     cairo_show_text(cairo.get(), list[n].text.c_str());
   }
   cairo_surface_flush(surface.get());
@@ -94,9 +94,9 @@ Image colourMapSheet() {
     const TransferFunctionDefinition map = presetDefinition(list[n].text);
     const ColourMap colours(map.colours, map.colour_space);
     const auto [left, top] = cornerOf(n);
-    for (int x = 0; x < kBarWidth; ++x) {
-      const glm::dvec3 colour = colours.at(static_cast<double>(x) / (kBarWidth - 1));
-      for (int y = 0; y < kBarHeight; ++y)
+    for (int x = 0; x < kStripWidth; ++x) {
+      const glm::dvec3 colour = colours.at(static_cast<double>(x) / (kStripWidth - 1));
+      for (int y = 0; y < kStripHeight; ++y)
         for (int channel = 0; channel < 3; ++channel)
           image.pixel(left + kBarBegin + x, top + y)[channel] = static_cast<float>(colour[channel]);
     }

@@ -117,7 +117,7 @@ constexpr int kModeBins = 4;          // on either side
 constexpr int kClearBins = 3;
 constexpr double kModeShare = 0.9;
 constexpr double kLargestDepth = 2.3;
-constexpr double kUnseenPart = 0.005;
+constexpr double kOutlyingPart = 0.005;
 constexpr size_t kMaxPoints = 24;
 constexpr double kRelativeError = 0.15, kMeanError = 0.1;
 constexpr double kEmptyShare = 1e-9;
@@ -204,7 +204,8 @@ std::pair<double, double> seenInterval(const VolumeHistogram& histogram, const B
   BinWeights weights;
   for (size_t bin = 0; bin < kBins; ++bin) weights[bin] = histogram.shares[bin] * extinctions[bin];
   if (!(std::accumulate(weights.begin(), weights.end(), 0.0) > 0)) return {histogram.low, histogram.high};
-  return {percentileOf(histogram, weights, kUnseenPart), percentileOf(histogram, weights, 1 - kUnseenPart)};
+  return {percentileOf(histogram, weights, kOutlyingPart),
+          percentileOf(histogram, weights, 1 - kOutlyingPart)};
 }
 
 std::optional<std::pair<double, double>> narrowedInterval(const VolumeHistogram& histogram,

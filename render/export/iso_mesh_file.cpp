@@ -17,8 +17,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kBlock = 4096;     // records
-constexpr size_t kKeptBlocks = 64;  // of vertices, for .stl
+constexpr size_t kBlockRecords = 4096;  // records
+constexpr size_t kKeptBlocks = 64;      // of vertices, for .stl
 constexpr size_t kBlockBytes = 1 << 18;
 
 static_assert(std::endian::native == std::endian::little);
@@ -76,7 +76,7 @@ template <typename T>
 void IsoMeshFile::Spool<T>::add(const T& record) {
   waiting.push_back(record);
   ++count;
-  if (waiting.size() == kBlock) flush();
+  if (waiting.size() == kBlockRecords) flush();
 }
 
 template <typename T>
@@ -89,8 +89,8 @@ template <typename T>
 void IsoMeshFile::Spool<T>::read(const std::function<void(std::span<const T>)>& take) {
   flush();
   std::vector<T> block;
-  for (uint64_t begin = 0; begin < count; begin += kBlock) {
-    block.resize(std::min<uint64_t>(kBlock, count - begin));
+  for (uint64_t begin = 0; begin < count; begin += kBlockRecords) {
+    block.resize(std::min<uint64_t>(kBlockRecords, count - begin));
     file.in().readAt(begin * sizeof(T), std::as_writable_bytes(std::span(block)));
     take(block);
   }
@@ -148,15 +148,15 @@ void IsoMeshFile::writeStl(OutputFile& file, const std::string& comment) {
   };
   std::vector<Block> kept(kKeptBlocks);
   const auto cornerAt = [&](uint32_t n) {
-    const uint64_t number = n / kBlock;
+    const uint64_t number = n / kBlockRecords;
     Block& block = kept[number % kKeptBlocks];
     if (block.number != number) {
       block.number = number;
-      block.vertices.resize(std::min<uint64_t>(kBlock, vertices_.count - number * kBlock));
-      vertices_.file.in().readAt(number * kBlock * sizeof(Vertex),
+      block.vertices.resize(std::min<uint64_t>(kBlockRecords, vertices_.count - number * kBlockRecords));
+      vertices_.file.in().readAt(number * kBlockRecords * sizeof(Vertex),
                                  std::as_writable_bytes(std::span(block.vertices)));
     }
-    return glm::vec3(block.vertices[n % kBlock].at);
+    return glm::vec3(block.vertices[n % kBlockRecords].at);
   };
   Bytes out(file);
   out.addText(fmt::format("{:<80.80}", comment));

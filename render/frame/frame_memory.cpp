@@ -128,7 +128,7 @@ std::vector<TileBox> boxesOf(const std::vector<uint32_t>& owners, ImageSize size
 }
 
 /// How much of from .. to lies in tiles first .. last - 1; of a point: 1 or 0.
-double shareOf(float from, float to, int first, int last) {
+double partWithin(float from, float to, int first, int last) {
   const double low = std::max<double>(from, first * kSharedTileSide),
                high = std::min<double>(to, last * kSharedTileSide);
   if (!(high >= low)) return 0;
@@ -214,8 +214,8 @@ std::vector<FrameRegion> frameRegions(const FramePlan& plan, const CacheReader& 
     std::vector<PartInRegion> parts;
     for (size_t n = 0; n < sample.size(); ++n) {
       const PartCost& cost = sample[n];
-      const double share = shareOf(cost.box.x0, cost.box.x1, box.x0, box.x1) *
-                           shareOf(cost.box.y0, cost.box.y1, box.y0, box.y1);
+      const double share = partWithin(cost.box.x0, cost.box.x1, box.x0, box.x1) *
+                           partWithin(cost.box.y0, cost.box.y1, box.y0, box.y1);
       if (share > 0) parts.push_back({plan.parts[n * stride].keys, share * cost.prepare, cost.prepare});
     }
     return parts;

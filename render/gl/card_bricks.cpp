@@ -27,7 +27,7 @@ size_t valueArrays(bool coloured) {
 
 /// No splat of the part has a later key in any tile. KeyRange::last allows for how splats lean; the rest is for pieces, which
 /// may be larger than their splats (BrickStore::canDraw()).
-uint64_t lastKeyOf(const StoredPart& part) {
+uint64_t lastKeyOfPart(const StoredPart& part) {
   return uint64_t{part.keys.last} + (part.keys.last - part.keys.first) / 4 + 1;
 }
 
@@ -99,7 +99,7 @@ CardBricks::Room CardBricks::roomFor(std::span<const StoredPart> parts, uint64_t
     }
     for (; !active.empty() && active.top().first < part.keys.first; active.pop()) now -= active.top().second;
     const uint64_t drawn = sizeof(ScreenSplat) * mostElements(part), pages = full + last;
-    active.emplace(lastKeyOf(part), drawn);
+    active.emplace(lastKeyOfPart(part), drawn);
     all += drawn;
     now += drawn;
     most = std::max(most, now);
@@ -318,7 +318,7 @@ std::vector<CardSlab> CardBricks::beginFrame(std::span<const StoredPart> parts) 
       CardSlab next, &last = slabs.back();
       last.front = parts[number].keys.first - 1;
       for (const uint32_t earlier : last.parts)
-        if (lastKeyOf(parts[earlier]) > last.front) {
+        if (lastKeyOfPart(parts[earlier]) > last.front) {
           next.parts.push_back(earlier);
           next.elements += elementsOf(parts[earlier]);
         }

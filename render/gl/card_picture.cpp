@@ -9,7 +9,7 @@ namespace curvisplat {
 namespace {
 
 constexpr GLint kLayerColoursUnit = 5;  // beyond those of SplatTables
-constexpr int kGroupSide = 8;
+constexpr int kCompositeGroupSide = 8;
 
 // Composites as PixelResult does: windows of depth and the layers between them, front to back, then the background.
 constexpr const char* kComposite = R"(#version 430 core
@@ -41,7 +41,7 @@ void main() {
 )";
 
 GLuint groupsAlong(int pixels) {
-  return static_cast<GLuint>((pixels + kGroupSide - 1) / kGroupSide);
+  return static_cast<GLuint>((pixels + kCompositeGroupSide - 1) / kCompositeGroupSide);
 }
 
 /// A texture for a picture, with a name that its owner deletes.

@@ -113,9 +113,9 @@ std::vector<Platform> platformsOf(const Egl& egl) {
 }
 
 /// The context, current, without a surface: all drawing goes to a framebuffer object.
-class CurrentContext {
+class CurrentEglContext {
  public:
-  CurrentContext() : egl_(loadEgl()) {
+  CurrentEglContext() : egl_(loadEgl()) {
     std::string said;
     for (const Platform& platform : platformsOf(egl_)) {
       const std::string failure = tryPlatform(platform);
@@ -126,12 +126,12 @@ class CurrentContext {
                 said.empty() ? "it found no device" : said);
   }
   /// The display stays initialised: it is the process's, and other contexts may use it.
-  ~CurrentContext() {
+  ~CurrentEglContext() {
     egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     egl_.destroy_context(display_, context_);
   }
-  CurrentContext(const CurrentContext&) = delete;
-  CurrentContext& operator=(const CurrentContext&) = delete;
+  CurrentEglContext(const CurrentEglContext&) = delete;
+  CurrentEglContext& operator=(const CurrentEglContext&) = delete;
 
   void* lookUp(const char* name) const { return reinterpret_cast<void*>(egl_.get_proc_address(name)); }
   /// "EGL device 0"
@@ -195,9 +195,9 @@ class CurrentContext {
 };
 
 // The first base makes the context current before the second one asks it for functions.
-class EglContext final : private CurrentContext, public GlContext {
+class EglContext final : private CurrentEglContext, public GlContext {
  public:
-  EglContext() : GlContext(CurrentContext::name(), [this](const char* name) { return lookUp(name); }) {}
+  EglContext() : GlContext(CurrentEglContext::name(), [this](const char* name) { return lookUp(name); }) {}
 };
 
 }  // namespace

@@ -86,9 +86,9 @@ OsMesa loadOsMesa() {
 
 /// The context and the pixels that OSMesa wants to be given, though all drawing goes to a framebuffer
 /// object.
-class CurrentContext {
+class CurrentOsMesaContext {
  public:
-  CurrentContext() : mesa_(loadOsMesa()) {
+  CurrentOsMesaContext() : mesa_(loadOsMesa()) {
     static constexpr int kAttributes[] = {OSMESA_FORMAT,
                                           OSMESA_RGBA,
                                           OSMESA_PROFILE,
@@ -105,12 +105,12 @@ class CurrentContext {
       throw Error("OSMesa cannot make its context current on this thread");
     }
   }
-  ~CurrentContext() {
+  ~CurrentOsMesaContext() {
     mesa_.make_current(nullptr, nullptr, GL_UNSIGNED_BYTE, 0, 0);
     mesa_.destroy_context(context_);
   }
-  CurrentContext(const CurrentContext&) = delete;
-  CurrentContext& operator=(const CurrentContext&) = delete;
+  CurrentOsMesaContext(const CurrentOsMesaContext&) = delete;
+  CurrentOsMesaContext& operator=(const CurrentOsMesaContext&) = delete;
 
   void* lookUp(const char* name) const { return reinterpret_cast<void*>(mesa_.get_proc_address(name)); }
 
@@ -122,7 +122,7 @@ class CurrentContext {
 };
 
 // The first base makes the context current before the second one asks it for functions.
-class OsMesaContext final : private CurrentContext, public GlContext {
+class OsMesaContext final : private CurrentOsMesaContext, public GlContext {
  public:
   OsMesaContext() : GlContext("OSMesa", [this](const char* name) { return lookUp(name); }) {}
 };

@@ -25,9 +25,9 @@ constexpr size_t kSplatsPerDraw = 16384;
 constexpr size_t kDrawsInFlight = 2;
 constexpr size_t kBatchSplats = 65536, kEntriesASplat = 4;
 /// How many records of a splat may come before it.
-constexpr size_t kMaxRecords = 3;
+constexpr size_t kMaxRecordsOfSplat = 3;
 
-/// Splats as the shader's instances, behind kMaxRecords elements that are not drawn: ScreenSplat's floats as 4 + 4 + 2,
+/// Splats as the shader's instances, behind kMaxRecordsOfSplat elements that are not drawn: ScreenSplat's floats as 4 + 4 + 2,
 /// and those of the two records that cut it, which lie before it; its skew, `along` and the pixels that it is clipped
 /// to, in the place of its keys; and its ScreenColour. Leaves itself bound.
 struct InstanceBuffer {
@@ -40,7 +40,7 @@ struct InstanceBuffer {
   /// `coloured`: a ScreenColour lies between a splat and what cuts it.
   void setUp(const GlFunctions& gl, bool coloured) {
     static constexpr GLint kComponents[] = {4, 4, 2};
-    constexpr size_t kSplat = kMaxRecords * sizeof(ScreenSplat);
+    constexpr size_t kSplat = kMaxRecordsOfSplat * sizeof(ScreenSplat);
     bind(gl);
     GLuint attribute = 0;
     const auto point = [&](GLint components, size_t offset) {
@@ -192,7 +192,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
                       PixelShading shading, const PaintResources& resources) {
   const GlFunctions& gl = state_->gl;
   state_->finishDraws();  // of a frame that was not ended
-  state_->staged.assign(kMaxRecords, {});
+  state_->staged.assign(kMaxRecordsOfSplat, {});
   const bool same_size = size == state_->size;
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
   state_->read_bytes = 0;
@@ -284,7 +284,7 @@ void GlPainter::State::stage(std::span<const ScreenSplat> splats, uint32_t splat
 }
 
 void GlPainter::State::drawStaged() {
-  if (staged.size() <= kMaxRecords) return;
+  if (staged.size() <= kMaxRecordsOfSplat) return;
   GlObject query = makeQuery(gl);
   instances.bind(gl);
   {
@@ -295,12 +295,12 @@ void GlPainter::State::drawStaged() {
   }
   const StageTimer timer(draw_s, "draw (OpenGL)");
   gl.BeginQuery(GL_TIME_ELAPSED, query.name());
-  gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(staged.size() - kMaxRecords));
+  gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(staged.size() - kMaxRecordsOfSplat));
   gl.EndQuery(GL_TIME_ELAPSED);
   gl.check("drawing splats");
   in_flight.push_back({GlFence(gl), std::move(query)});
   if (in_flight.size() > kDrawsInFlight) finishOldest();
-  staged.resize(kMaxRecords);
+  staged.resize(kMaxRecordsOfSplat);
 }
 
 void GlPainter::State::finishOldest() {

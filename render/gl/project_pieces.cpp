@@ -12,7 +12,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr const char* kInputs = R"(
+constexpr const char* kPieceInputs = R"(
 uniform samplerBuffer layer_bounds;  // PixelLayers::allBounds()
 uniform uint colour_records;  // 1 in pictures of two scalars, else 0
 )";
@@ -432,7 +432,7 @@ void main() {
 }  // namespace
 
 std::string pieceInputs() {
-  return kInputs;
+  return kPieceInputs;
 }
 
 std::string pieceFunctions() {

@@ -51,7 +51,7 @@ uniform float key_steps_a_pixel;
 shared uint group_fates[FATES];
 )";
 
-constexpr const char* kProject = R"(
+constexpr const char* kProjectBody = R"(
 // Under these rows of a linear map, as ellipseOf() in footprint.h.
 struct Ellipse {
   float l11, l21, l22, amplitude, slope0, slope1, half_width, along;
@@ -346,7 +346,7 @@ std::string projectShader(bool perspective) {
       "#define VALUE_ARRAYS {}u\n",
       sizeof(ShaderPart) / 16, kFates, ScreenCut::kReach, kGeometryArrays, kValueArrays);
   return fmt::format("#version 430 core\n{}{}{}{}{}{}{}{}", constants, growth, sizes, splatUniforms(),
-                     kInputs, pieceInputs(), kProject, pieceFunctions());
+                     kInputs, pieceInputs(), kProjectBody, pieceFunctions());
 }
 
 }  // namespace curvisplat

@@ -34,8 +34,8 @@ constexpr std::array<RequiredAttribute, 8> kRequired{{{"channels", 1},
                                                       {"screenWindowWidth", 4}}};
 constexpr size_t kMaxAttributes = 128;
 
-constexpr uint32_t kLongNames = 0x400;    // the only flag that is accepted beside version 2
-constexpr uint64_t kLargestRatio = 1032;  // of zlib; run-length encoding reaches 64
+constexpr uint32_t kLongNames = 0x400;       // the only flag that is accepted beside version 2
+constexpr uint64_t kLargestExrRatio = 1032;  // of zlib; run-length encoding reaches 64
 
 struct ExrChannel {
   std::string name;
@@ -128,7 +128,7 @@ void takeAttribute(const std::string& attribute, std::span<const std::byte> data
   }
 }
 
-ExrLayout takeHeader(Cursor& file, const std::string& name) {
+ExrLayout takeLayout(Cursor& file, const std::string& name) {
   file.read<uint32_t>();  // the magic number, which selected this decoder
   const auto version = file.read<uint32_t>();
   if ((version & ~kLongNames) != 2)
@@ -158,8 +158,8 @@ ExrLayout takeHeader(Cursor& file, const std::string& name) {
 // a plausible length.
 void requireChunks(Cursor& file, const ExrLayout& layout, std::span<const std::byte> bytes,
                    const std::string& name) {
-  requirePlausibleSize(layout.width(), layout.height(), layout.bytesPerPixel(), bytes.size(), kLargestRatio,
-                       name);
+  requirePlausibleSize(layout.width(), layout.height(), layout.bytesPerPixel(), bytes.size(),
+                       kLargestExrRatio, name);
   const int64_t chunks = (layout.height() + layout.linesPerChunk() - 1) / layout.linesPerChunk();
   Cursor table(file.takeBytes(8 * static_cast<size_t>(chunks)), name);
   for (int64_t c = 0; c < chunks; ++c) {
@@ -175,7 +175,7 @@ void requireChunks(Cursor& file, const ExrLayout& layout, std::span<const std::b
     const uint64_t unpacked = lines * static_cast<uint64_t>(layout.width()) * layout.bytesPerPixel();
     const bool plausible = layout.compression == TINYEXR_COMPRESSIONTYPE_NONE
                                ? size == unpacked
-                               : size <= unpacked && unpacked / kLargestRatio <= size;
+                               : size <= unpacked && unpacked / kLargestExrRatio <= size;
     if (line != layout.min_y + first || size == 0 || !plausible)
       throw Error("{}: EXR chunk {} at byte {} claims {} bytes from line {} on; the file is corrupt", name, c,
                   offset, size, line);
@@ -234,7 +234,7 @@ struct TinyExrFile {
 /// Throws Error unless TinyEXR can be given the file.
 ExrLayout checkFile(std::span<const std::byte> bytes, const std::string& name) {
   Cursor cursor(bytes, name);
-  const ExrLayout layout = takeHeader(cursor, name);
+  const ExrLayout layout = takeLayout(cursor, name);
   requireChunks(cursor, layout, bytes, name);
   return layout;
 }
@@ -321,7 +321,7 @@ std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, co
 
 ImageSize sizeOfExr(std::span<const std::byte> bytes, const std::string& name) {
   Cursor cursor(bytes, name);
-  const ExrLayout layout = takeHeader(cursor, name);
+  const ExrLayout layout = takeLayout(cursor, name);
   constexpr size_t kMaxOfMap = 4;
   if (layout.channels.size() > kMaxOfMap)
     throw Error("{}: has {} channels; a map has at most {} (R, G, B, A)", name, layout.channels.size(),

@@ -17,7 +17,7 @@ namespace curvisplat {
 namespace {
 
 // A block of 8 x 8 pixels takes a bit or more in one of the scans, but for runs of empty ones.
-constexpr uint64_t kLargestRatio = 4096;
+constexpr uint64_t kLargestJpegRatio = 4096;
 constexpr int kMaxScans = 200;  // of progressive files: each goes through all pixels, and usual ones have ten
 
 struct JpegErrors : jpeg_error_mgr {
@@ -62,7 +62,7 @@ struct JpegReader {
   JpegReader& operator=(const JpegReader&) = delete;
 };
 
-bool readHeader(JpegReader& reader, std::span<const std::byte> bytes) {
+bool readJpegHeader(JpegReader& reader, std::span<const std::byte> bytes) {
   if (setjmp(reader.errors.stop)) return false;
   jpeg_create_decompress(&reader.jpeg);
   reader.jpeg.progress = &reader.progress;
@@ -73,7 +73,7 @@ bool readHeader(JpegReader& reader, std::span<const std::byte> bytes) {
   return true;
 }
 
-bool readPixels(JpegReader& reader, JSAMPROW row, Image& image) {
+bool readJpegPixels(JpegReader& reader, JSAMPROW row, Image& image) {
   if (setjmp(reader.errors.stop)) return false;
   reader.jpeg.out_color_space = JCS_RGB;
   jpeg_start_decompress(&reader.jpeg);
@@ -90,7 +90,7 @@ bool readPixels(JpegReader& reader, JSAMPROW row, Image& image) {
 }
 
 ImageSize takeHeader(JpegReader& reader, std::span<const std::byte> bytes, const std::string& name) {
-  if (!readHeader(reader, bytes))
+  if (!readJpegHeader(reader, bytes))
     throw Error("{}: the JPEG header cannot be read: {}{}", name, reader.errors.text, limitOfHeader(bytes));
   return {static_cast<int>(reader.jpeg.image_width), static_cast<int>(reader.jpeg.image_height)};
 }
@@ -105,10 +105,10 @@ ImageSize sizeOfJpeg(std::span<const std::byte> bytes, const std::string& name) 
 Image decodeJpeg(std::span<const std::byte> bytes, const std::string& name) {
   JpegReader reader;
   const ImageSize size = takeHeader(reader, bytes, name);
-  requirePlausibleSize(size.width, size.height, 1, bytes.size(), kLargestRatio, name);
+  requirePlausibleSize(size.width, size.height, 1, bytes.size(), kLargestJpegRatio, name);
   Image image(size);
   std::vector<JSAMPLE> row(3 * static_cast<size_t>(size.width));
-  if (!readPixels(reader, row.data(), image))
+  if (!readJpegPixels(reader, row.data(), image))
     throw Error("{}: the JPEG file's pixels cannot be read: {}", name, reader.errors.text);
   return image;
 }

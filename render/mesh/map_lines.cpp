@@ -147,7 +147,7 @@ void addGeoJson(const JsonField& object, MapLines& lines) {
 //
 // Source: ESRI Shapefile Technical Description, July 1998. Lengths in words of two bytes, big-endian; the rest little-endian.
 
-constexpr size_t kHeader = 100, kRecordHeader = 8;
+constexpr size_t kShapefileHeader = 100, kRecordHeader = 8;
 constexpr uint32_t kFileCode = 9994;
 
 class ShapeBytes {
@@ -227,9 +227,9 @@ CurveSet parseGeoJson(std::string_view text, const std::filesystem::path& path, 
 CurveSet parseShapefile(std::string_view bytes, const std::filesystem::path& path, const Globe& globe,
                         const GeographicBox& box) {
   const ShapeBytes file(bytes, path);
-  if (file.size() < kHeader || file.big(0) != kFileCode) file.fail("is not a shapefile");
+  if (file.size() < kShapefileHeader || file.big(0) != kFileCode) file.fail("is not a shapefile");
   MapLines lines(path, globe, box);
-  for (size_t at = kHeader; at < file.size();) {
+  for (size_t at = kShapefileHeader; at < file.size();) {
     const size_t begin = at + kRecordHeader, end = begin + 2 * size_t{file.big(at + 4)};
     if (end > file.size()) file.fail("is truncated");
     if (end < begin + 4) file.fail("a record has no shape");

@@ -66,7 +66,7 @@ namespace {
 
 // Binary STL:
 //   80 bytes of text | number of triangles u32 | each: normal, 3 corners (12 floats), u16
-constexpr size_t kHeader = 84, kRecord = 50, kCorners = 12;
+constexpr size_t kStlHeader = 84, kRecord = 50, kCorners = 12;
 
 uint32_t countOf(std::string_view bytes) {
   uint32_t count = 0;
@@ -78,14 +78,14 @@ uint32_t countOf(std::string_view bytes) {
 
 // The text may begin with "solid" as well: the size decides.
 bool isBinaryStl(std::string_view bytes) {
-  return bytes.size() >= kHeader && bytes.size() == kHeader + kRecord * uint64_t{countOf(bytes)};
+  return bytes.size() >= kStlHeader && bytes.size() == kStlHeader + kRecord * uint64_t{countOf(bytes)};
 }
 
 RawMesh parseBinaryStl(std::string_view bytes, const std::filesystem::path& path) {
-  if (bytes.size() < kHeader)
+  if (bytes.size() < kStlHeader)
     throw Error("{}: is truncated: a binary STL file has {} bytes before its triangles (found {})",
-                path.string(), kHeader, bytes.size());
-  const uint64_t expected = kHeader + kRecord * uint64_t{countOf(bytes)};
+                path.string(), kStlHeader, bytes.size());
+  const uint64_t expected = kStlHeader + kRecord * uint64_t{countOf(bytes)};
   if (bytes.size() < expected)
     throw Error("{}: is truncated: {} triangles take {} bytes (found {})", path.string(), countOf(bytes),
                 expected, bytes.size());
@@ -95,7 +95,7 @@ RawMesh parseBinaryStl(std::string_view bytes, const std::filesystem::path& path
   mesh.triangles.reserve(count);
   for (size_t n = 0; n < count; ++n) {
     float corners[9];
-    std::memcpy(corners, bytes.data() + kHeader + kRecord * n + kCorners, sizeof corners);
+    std::memcpy(corners, bytes.data() + kStlHeader + kRecord * n + kCorners, sizeof corners);
     const auto first = static_cast<uint32_t>(mesh.positions.size());
     for (int corner = 0; corner < 3; ++corner)
       mesh.positions.emplace_back(corners[3 * corner], corners[3 * corner + 1], corners[3 * corner + 2]);

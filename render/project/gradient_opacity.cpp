@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMaxSteps = 5;
+constexpr uint64_t kMaxSampledSteps = 5;
 constexpr size_t kMaxBricks = 128;  // of all steps
 
 /// `count` numbers of 0 .. size - 1 at most, evenly spread.
@@ -25,7 +25,7 @@ std::vector<size_t> spread(size_t size, size_t count) {
 
 GradientPercentiles::GradientPercentiles(const CacheReader& cache, size_t variable, const glm::dvec3& scale) {
   const glm::vec3 per_scale(1.0 / scale);
-  const std::vector<size_t> steps = spread(cache.series().steps.size(), kMaxSteps);
+  const std::vector<size_t> steps = spread(cache.series().steps.size(), kMaxSampledSteps);
   std::vector<float> magnitudes, volumes;
   SplatGeometry geometry;
   SplatVariable values;

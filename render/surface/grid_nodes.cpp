@@ -17,7 +17,7 @@ namespace {
 constexpr double kBend = 0.5 * kKernelSigma * kKernelSigma, kMaxBend = 4;
 constexpr int kUnbendSteps = 3;
 
-constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
 
 /// A splat's node, as far as the splat alone tells: its place and value, but for neighbours', and the scalar's slope in space.
 struct FoundNode {
@@ -182,7 +182,7 @@ void GridNodes::read(const CacheReader& cache, size_t variable, const Stop& thro
 }
 
 void GridNodes::readLeaves(const CacheReader& cache, size_t variable, const Stop& throw_if_stopped) {
-  std::fill(value_.begin(), value_.end(), kNone);
+  std::fill(value_.begin(), value_.end(), kNoValue);
   SplatGeometry geometry;
   SplatVariable values;
   std::vector<NodeRun> runs;

@@ -21,7 +21,7 @@ constexpr int kMaxRounds = 32;          // maps of a face
 constexpr uint64_t kMaxCompared = 2e8;  // nodes
 constexpr double kNear = 1.5;           // cells, between where a node is expected and a candidate
 constexpr double kMaxAside = 1;         // lengths of the last cell, between there and where the majority says
-constexpr uint32_t kNobody = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNoSplat = std::numeric_limits<uint32_t>::max();
 
 /// A face of a block.
 struct BlockFace {
@@ -76,7 +76,7 @@ class Joiner {
         is_there_(is_there),
         at_(at),
         throw_if_stopped_(throw_if_stopped),
-        same_(is_there.size(), kNobody) {
+        same_(is_there.size(), kNoSplat) {
     for (size_t block = 0; block < blocks.size(); ++block)
       for (size_t axis = 0; axis < 3; ++axis)
         for (const bool at_end : {false, true}) faces_.push_back({block, axis, at_end});
@@ -108,7 +108,7 @@ class Joiner {
     if (left != 0) return std::nullopt;
     std::vector<JoinedNode> joined;
     for (size_t node = 0; node < same_.size(); ++node)
-      if (same_[node] != kNobody) joined.push_back({static_cast<uint32_t>(node), same_[node]});
+      if (same_[node] != kNoSplat) joined.push_back({static_cast<uint32_t>(node), same_[node]});
     return joined;
   }
 
@@ -144,7 +144,7 @@ class Joiner {
     }
     return true;
   }
-  bool isKnown(size_t node) const { return is_there_[node] || same_[node] != kNobody; }
+  bool isKnown(size_t node) const { return is_there_[node] || same_[node] != kNoSplat; }
   glm::dvec3 at(size_t node) const { return at_(is_there_[node] ? node : same_[node]); }
 
   /// Finds where the node at a place of a face is expected, by the two behind it and those beside them.
@@ -374,7 +374,7 @@ class Joiner {
   const std::function<void()>& throw_if_stopped_;
   std::vector<BlockFace> faces_;
   NodeTree candidates_;         // nodes of faces that have splats
-  std::vector<uint32_t> same_;  // [node]: whose splat it has; kNobody: its own, or not known
+  std::vector<uint32_t> same_;  // [node]: whose splat it has; kNoSplat: its own, or not known
   std::vector<std::pair<BlockFace, FaceMap>> maps_;  // that have found nodes
   uint64_t compared_ = 0;
 };

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr TemporaryNames kNames{".curvisplat.", ".part"};
 
-std::string reason() {
+std::string errnoText() {
   return std::strerror(errno);
 }
 
@@ -52,7 +52,7 @@ TemporaryFile::TemporaryFile(fs::path target) : target_(std::move(target)) {
     path_ = std::move(file.path);
     fd_ = file.fd;
     if (fd_ < 0 && DiskFull::is(errno)) throw DiskFull(path_, target_, "a new file", errno);
-    if (fd_ < 0) throw Error("{}: no file can be made beside it: {}", target_.string(), reason());
+    if (fd_ < 0) throw Error("{}: no file can be made beside it: {}", target_.string(), errnoText());
     if (lockNew(fd_)) return;
     SystemCalls::current().close(fd_);
   }
@@ -77,7 +77,7 @@ void TemporaryFile::putIntoPlace() {
   } while (result < 0 && errno == EINTR);
   if (result < 0 && DiskFull::is(errno)) throw DiskFull(path_, target_, "what was written", errno);
   if (result < 0 && errno != EINVAL && errno != ENOTSUP)
-    throw Error("{}: cannot be synced to the disk: {}", target_.string(), reason());
+    throw Error("{}: cannot be synced to the disk: {}", target_.string(), errnoText());
   try {
     renameDurably(path_, target_);
   } catch (const NameNotSynced&) {

@@ -107,15 +107,15 @@ class TraceFile {
 class ThreadEvents;
 
 /// All of the process. The locks are taken in this order: the registry's, a thread's.
-struct Registry {
+struct TraceRegistry {
   Mutex mutex;
   std::unique_ptr<TraceFile> file GUARDED_BY(mutex);
   std::vector<ThreadEvents*> threads GUARDED_BY(mutex);
 };
 
 /// Never destroyed: threads that outlive main() still leave it.
-Registry& registry() {
-  static Registry& all = *new Registry;
+TraceRegistry& registry() {
+  static TraceRegistry& all = *new TraceRegistry;
   return all;
 }
 
@@ -123,12 +123,12 @@ Registry& registry() {
 class ThreadEvents {
  public:
   ThreadEvents() {
-    Registry& all = registry();
+    TraceRegistry& all = registry();
     const MutexLock lock(all.mutex);
     all.threads.push_back(this);
   }
   ~ThreadEvents() {
-    Registry& all = registry();
+    TraceRegistry& all = registry();
     const MutexLock lock(all.mutex);
     if (all.file) writeTo(*all.file);
     std::erase(all.threads, this);
@@ -142,7 +142,7 @@ class ThreadEvents {
       events_.push_back(event);
       if (events_.size() < kKeptEvents) return;
     }
-    Registry& all = registry();
+    TraceRegistry& all = registry();
     const MutexLock lock(all.mutex);
     if (all.file) writeTo(*all.file);
   }
@@ -174,7 +174,7 @@ class ThreadEvents {
 }  // namespace
 
 void Trace::begin(const std::filesystem::path& path, unsigned process) {
-  Registry& all = registry();
+  TraceRegistry& all = registry();
   const MutexLock lock(all.mutex);
   CURVISPLAT_CHECK(!all.file);
   all.file = std::make_unique<TraceFile>(path, process);
@@ -183,7 +183,7 @@ void Trace::begin(const std::filesystem::path& path, unsigned process) {
 }
 
 void Trace::end() {
-  Registry& all = registry();
+  TraceRegistry& all = registry();
   const MutexLock lock(all.mutex);
   if (!all.file) return;
   on_ = false;

@@ -29,7 +29,7 @@ std::string unpadded(const std::array<char, N>& text) {
   return oneLine(std::string(text.begin(), std::find(text.begin(), text.end(), '\0')));
 }
 
-FaceRecord recordOf(const GridFace& face) {
+FaceRecord storedRecord(const GridFace& face) {
   return {face.block,
           static_cast<uint8_t>(face.axis),
           static_cast<uint8_t>(face.side),
@@ -40,7 +40,7 @@ FaceRecord recordOf(const GridFace& face) {
           0};
 }
 
-PatchRecord recordOf(const FacePatch& patch) {
+PatchRecord storedRecord(const FacePatch& patch) {
   PatchRecord record{};
   record.face = patch.face;
   record.first_child = patch.first_child;
@@ -61,7 +61,7 @@ PatchRecord recordOf(const FacePatch& patch) {
   return record;
 }
 
-RegionRecord recordOf(const FaceRegion& region) {
+RegionRecord storedRecord(const FaceRegion& region) {
   return {region.face,
           0,
           {region.first[0], region.first[1]},
@@ -200,9 +200,9 @@ FileInfo FacesWriter::finish(std::span<const GridFace> faces, std::span<const st
     header.step[axis] = box_.step[axis];
   }
   std::vector<FaceRecord> face_records;
-  for (const GridFace& face : faces) face_records.push_back(recordOf(face));
+  for (const GridFace& face : faces) face_records.push_back(storedRecord(face));
   std::vector<RegionRecord> region_records;
-  for (const FaceRegion& region : regions) region_records.push_back(recordOf(region));
+  for (const FaceRegion& region : regions) region_records.push_back(storedRecord(region));
   Checksum checksum;
   checksum.add(bytesOf(header));
   const auto append = [&](std::span<const std::byte> part) {
@@ -216,7 +216,7 @@ FileInfo FacesWriter::finish(std::span<const GridFace> faces, std::span<const st
   std::vector<PatchRecord> records;
   for (const std::vector<FacePatch>& of_face : patches)
     for (const FacePatch& patch : of_face) {
-      records.push_back(recordOf(patch));
+      records.push_back(storedRecord(patch));
       if (records.size() < kRecordsAtOnce) continue;
       append(bytesOf(records));
       records.clear();

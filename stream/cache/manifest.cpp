@@ -207,7 +207,7 @@ void readFiles(const JsonField& list, Manifest& manifest) {
 }
 
 /// The earliest caches have no checksum.
-void checkChecksum(JsonDocument& document, const std::filesystem::path& path) {
+void checkOwnChecksum(JsonDocument& document, const std::filesystem::path& path) {
   if (!document.root().has(kChecksum)) return;
   const std::string stated = document.root().at(kChecksum).text();
   document.json().erase(kChecksum);
@@ -329,7 +329,7 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   }
   const uint64_t version = document.root().at("version").count();
   checkVersion(version, path);
-  checkChecksum(document, path);
+  checkOwnChecksum(document, path);
   const JsonField fields = document.root();
   Manifest manifest;
   if (version >= kFirstWithRequirements) manifest.requirements = linesOf(fields.at("requires"));

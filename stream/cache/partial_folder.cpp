@@ -328,7 +328,7 @@ size_t entryBytes(size_t variables) {
 }
 
 template <typename T>
-void put(const T& value, std::vector<std::byte>& out) {
+void appendValue(const T& value, std::vector<std::byte>& out) {
   const size_t begin = out.size();
   out.resize(begin + sizeof value);
   std::memcpy(&out[begin], &value, sizeof value);
@@ -382,10 +382,10 @@ BrickLog::BrickLog(const std::filesystem::path& folder, size_t variables)
 
 void BrickLog::append(const AppendedBrick& brick) {
   entry_.clear();
-  put(recordOf(brick.brick), entry_);
-  put(brick.weight, entry_);
-  for (const BrickVariable& variable : brick.variables) put(recordOf(variable), entry_);
-  put(checksumOf(entry_), entry_);
+  appendValue(recordOf(brick.brick), entry_);
+  appendValue(brick.weight, entry_);
+  for (const BrickVariable& variable : brick.variables) appendValue(recordOf(variable), entry_);
+  appendValue(checksumOf(entry_), entry_);
   file_.append(std::span<const std::byte>(entry_));
 }
 

@@ -115,8 +115,8 @@ std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sou
 namespace {
 
 /// Appends the step to the series and replaces the manifest. `files`: further files of the step.
-void putStep(const CacheLock& lock, const Manifest& old, Series series, SeriesStep step, const NewStep& added,
-             std::span<const FileInfo> files) {
+void commitStep(const CacheLock& lock, const Manifest& old, Series series, SeriesStep step,
+                const NewStep& added, std::span<const FileInfo> files) {
   Manifest manifest = old;
   for (size_t v = 0; v < manifest.variables.size(); ++v) {
     step.values[v].min = added.ranges[v].min;
@@ -216,7 +216,7 @@ std::vector<FileInfo> StepWriter::finish() {
   }
   syncDirectory(folder_);
   try {
-    putStep(*lock_, manifest_, series_, std::move(step), added_, others_);
+    commitStep(*lock_, manifest_, series_, std::move(step), added_, others_);
   } catch (const NameNotSynced&) {
     in_place_ = true;
     throw;
@@ -229,7 +229,7 @@ void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep 
                     std::span<const FileInfo> others) {
   lock.requireStillThere();
   syncDirectory(lock.cache());
-  putStep(lock, cache.seriesManifest(), cache.series(), std::move(step), added, others);
+  commitStep(lock, cache.seriesManifest(), cache.series(), std::move(step), added, others);
 }
 
 void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added) {
@@ -249,7 +249,7 @@ void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewS
   CURVISPLAT_CHECK_OP(step.values.size(), ==, cache.seriesManifest().variables.size());
   lock.requireStillThere();
   syncDirectory(lock.cache());
-  putStep(lock, cache.seriesManifest(), series, std::move(step), added, {});
+  commitStep(lock, cache.seriesManifest(), series, std::move(step), added, {});
 }
 
 void removeStepsFrom(uint64_t count, const CacheLock& lock, const CacheReader& cache) {

@@ -114,13 +114,13 @@ std::array<uint32_t, 9> childrenByOctant(const BrickView& view, const Brick& bri
 }
 
 /// The octants of bricks that are replaced by their children.
-class Refinement {
+class RefinedOctants {
  public:
   /// Refines all that is not fine enough.
-  explicit Refinement(const BrickView& view) : view_(view) {}
+  explicit RefinedOctants(const BrickView& view) : view_(view) {}
 
   /// Refines within the limits: the largest error first, of equal ones the lowest brick number.
-  Refinement(const BrickView& view, size_t bricks, uint64_t max_splats, uint64_t max_bytes)
+  RefinedOctants(const BrickView& view, size_t bricks, uint64_t max_splats, uint64_t max_bytes)
       : view_(view), limited_(true), max_splats_(max_splats), max_bytes_(max_bytes), refined_(bricks) {
     for (uint32_t id = 0; id < view_.roots(); ++id) {
       if (!view_.visible(id)) continue;
@@ -202,7 +202,7 @@ class Refinement {
 /// One walk down the octree, farthest first.
 class CutWalk {
  public:
-  CutWalk(const BrickView& view, const Refinement& refinement) : view_(view), refinement_(refinement) {}
+  CutWalk(const BrickView& view, const RefinedOctants& refinement) : view_(view), refinement_(refinement) {}
 
   Cut walk() {
     for (uint32_t id = 0; id < view_.roots(); ++id) visit(id);
@@ -257,7 +257,7 @@ class CutWalk {
   }
 
   const BrickView& view_;
-  const Refinement& refinement_;
+  const RefinedOctants& refinement_;
   Cut cut_;
 };
 
@@ -288,9 +288,9 @@ Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds&
   const BrickView bricks(tree, view, transparent, options);
   const bool limited =
       options.max_splats != CutOptions::kNoLimit || options.max_bytes != CutOptions::kNoLimit;
-  const Refinement refinement =
-      limited ? Refinement(bricks, tree.bricks.size(), options.max_splats, options.max_bytes)
-              : Refinement(bricks);
+  const RefinedOctants refinement =
+      limited ? RefinedOctants(bricks, tree.bricks.size(), options.max_splats, options.max_bytes)
+              : RefinedOctants(bricks);
   Cut cut = CutWalk(bricks, refinement).walk();
   cut.complete = refinement.complete();
   return cut;

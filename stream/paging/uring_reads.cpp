@@ -19,7 +19,7 @@ constexpr uint64_t kWakeTag = ~uint64_t{0};
 
 // The kernel answers EAGAIN or EBUSY if it has no memory. After this many in a row, reading has
 // failed.
-constexpr unsigned kMaxPutOff = 1000;
+constexpr unsigned kMaxRefusals = 1000;
 
 /// Two connected sockets that do not block.
 using Sockets = std::array<int, 2>;
@@ -58,7 +58,7 @@ class UringReads : public AsyncReads {
     for (unsigned put_off = 0; io_uring_peek_cqe(&ring_, &end) != 0;) {
       const int result = io_uring_submit_and_wait(&ring_, 1);
       const bool is_put_off = result == -EAGAIN || result == -EBUSY;
-      if (result < 0 && result != -EINTR && !(is_put_off && ++put_off < kMaxPutOff))
+      if (result < 0 && result != -EINTR && !(is_put_off && ++put_off < kMaxRefusals))
         throw Error("reading with io_uring failed: {}", std::strerror(-result));
     }
     const AsyncReadEnd ended{io_uring_cqe_get_data64(end), end->res};

@@ -19,12 +19,12 @@ namespace {
 struct BackendScene {
   std::string scene;
   Words options;  // of `generate`
-};
 
-void PrintTo(const BackendScene& scene, std::ostream* out) {
-  *out << scene.scene;
-  for (const std::string& option : scene.options) *out << ' ' << option;
-}
+  friend void PrintTo(const BackendScene& scene, std::ostream* out) {
+    *out << scene.scene;
+    for (const std::string& option : scene.options) *out << ' ' << option;
+  }
+};
 
 /// Returns what EGL draws with here, or why it does not.
 std::string eglOf(const ProgramResult& system) {

@@ -122,14 +122,13 @@ INSTANTIATE_TEST_SUITE_P(Scenes, DefaultPictures,
                          });
 
 /// Real grids, which lie in a folder beside the project, where they are there; and the scalars that vary.
-struct RealGrid {
+struct GridWithScalars {
   const char* name;
   Words files, scalars;
+
+  friend void PrintTo(const GridWithScalars& grid, std::ostream* out) { *out << grid.name; }
 };
-void PrintTo(const RealGrid& grid, std::ostream* out) {
-  *out << grid.name;
-}
-std::vector<RealGrid> realGrids() {
+std::vector<GridWithScalars> realGrids() {
   const Words whole_flow{"density", "momentum_x", "momentum_y", "momentum_z", "energy"};
   return {
       {"bluntfin", {"bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin"}, whole_flow},
@@ -151,7 +150,7 @@ std::vector<RealGrid> realGrids() {
   };
 }
 
-class DefaultPicturesOfRealGrids : public testing::TestWithParam<RealGrid> {};
+class DefaultPicturesOfRealGrids : public testing::TestWithParam<GridWithScalars> {};
 
 TEST_P(DefaultPicturesOfRealGrids, ShowSomething) {
   const std::filesystem::path data = CURVISPLAT_SHARED_DATA;

@@ -18,10 +18,10 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{128, 128};
+constexpr ImageSize kCoarsePicture{128, 128};
 
 Image marched(const ReferenceField& field, const KnownFunction& function, const Camera& camera,
-              ImageSize size = kSize, const ReferenceLight* light = nullptr) {
+              ImageSize size = kCoarsePicture, const ReferenceLight* light = nullptr) {
   MarchSteps steps = stepsFor(field);
   steps.cells = 1;
   return toImage(referenceMarch(field, function.exact, camera, size, steps, {light}));
@@ -55,10 +55,11 @@ struct KnownPicture {
 void expectWorth(const std::string& what, const KnownPicture& known, double least_db,
                  const DirectOptions& with, const DirectOptions& without) {
   const KnownFunction function = KnownFunction::of(known.function);
-  const ImageSize size{known.rays * kSize.width, known.rays * kSize.height};
+  const ImageSize size{known.rays * kCoarsePicture.width, known.rays * kCoarsePicture.height};
   const Image reference = averaged(marched(known.field, function, known.camera, size), known.rays);
   const auto db = [&](const DirectOptions& options) {
-    const Image picture = drawDirectly(known.source, 0, options, function.table, known.camera, kSize);
+    const Image picture =
+        drawDirectly(known.source, 0, options, function.table, known.camera, kCoarsePicture);
     return compareImages(picture, reference).psnr_db;
   };
   const double with_db = db(with), without_db = db(without);
@@ -130,7 +131,7 @@ TEST_F(Corrections, LayersBehindSeveralFaces) {
   const auto outside = [&](bool layers) {
     DirectOptions options;
     options.nodes.layers = layers;
-    const double share = shareOutside(drawDirectly(cube, 0, options, thin.table, camera, kSize), 80);
+    const double share = shareOutside(drawDirectly(cube, 0, options, thin.table, camera, kCoarsePicture), 80);
     fmt::print("layers behind several faces{}: {:.4f} % outside\n", layers ? "" : ", without", 100 * share);
     return share;
   };
@@ -157,7 +158,7 @@ TEST_F(Corrections, CutsAtClipPlanes) {
     DirectOptions without = with;
     without.cut_splats = false;
     expectWorth(cut.name, {source_, clipped, "smooth", halfAnnulusCamera()}, cut.finest_db, with, without);
-    with.voxel = without.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
+    with.voxel = without.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kCoarsePicture.height;
     expectWorth(std::string(cut.name) + ", 4 pixels", {source_, clipped, "smooth", halfAnnulusCamera()},
                 cut.merged_db, with, without);
   }
@@ -174,13 +175,14 @@ TEST_F(Corrections, LightFromEachSplatsGradient) {
   for (const auto& light : lights) {
     ReferenceLight truth;
     truth.towards = light.towards;
-    const Image reference = marched(field_, function, halfAnnulusCamera(), kSize, &truth);
+    const Image reference = marched(field_, function, halfAnnulusCamera(), kCoarsePicture, &truth);
     for (const bool merged : {false, true}) {
       DirectOptions options;
-      if (merged) options.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
+      if (merged) options.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kCoarsePicture.height;
       const auto db = [&] {
-        return compareImages(drawDirectly(source_, 0, options, function.table, halfAnnulusCamera(), kSize),
-                             reference)
+        return compareImages(
+                   drawDirectly(source_, 0, options, function.table, halfAnnulusCamera(), kCoarsePicture),
+                   reference)
             .psnr_db;
       };
       const double unlit_db = db();
@@ -373,12 +375,13 @@ TEST_F(Corrections, VarianceOfMergedSplats) {
   camera.focal_point = {0.5, 0.5, 0.5};
   camera.parallel_scale = 0.2;  // no borders
   const KnownFunction function = KnownFunction::of("band");
-  const Image all = drawDirectly(source, 0, {}, function.table, camera, kSize);
+  const Image all = drawDirectly(source, 0, {}, function.table, camera, kCoarsePicture);
   DirectOptions with, without;
   with.voxel = without.voxel = 6 / 47.0;
   without.variance = false;
   const auto db = [&](const DirectOptions& options) {
-    return compareImages(drawDirectly(source, 0, options, function.table, camera, kSize), all).psnr_db;
+    return compareImages(drawDirectly(source, 0, options, function.table, camera, kCoarsePicture), all)
+        .psnr_db;
   };
   const double with_db = db(with), without_db = db(without);
   fmt::print("variance of merged splats: {:.1f} dB, without {:.1f} dB\n", with_db, without_db);

@@ -55,8 +55,8 @@ class FidelityProperties : public testing::Test {
   TemporaryFolder folder_;
 };
 
-Image marched(const Scene& scene, const std::string& function, const Camera& camera, ImageSize size,
-              double near = 0) {
+Image marchedScene(const Scene& scene, const std::string& function, const Camera& camera, ImageSize size,
+                   double near = 0) {
   const SceneField field(scene);
   MarchSteps steps = stepsFor(field);
   steps.near = near;
@@ -141,7 +141,7 @@ TEST_F(FidelityProperties, OpacityDoesNotDependOnSampling) {
     return sum / static_cast<double>(image.rgba.size() / 4);
   };
   const auto scene = std::shared_ptr<const Scene>(makeScene("half-annulus-constant"));
-  const double exact = meanOpacity(marched(*scene, "smooth", halfAnnulusCamera(), kSize));
+  const double exact = meanOpacity(marchedScene(*scene, "smooth", halfAnnulusCamera(), kSize));
   for (const uint64_t nodes : {16, 32, 64, 128}) {
     if (nodes != 16 && nodes != 64 && !faults::isWholeSweep()) continue;
     const double opacity = meanOpacity(
@@ -200,7 +200,7 @@ TEST_F(FidelityProperties, PerspectiveIsAsGoodAsOrthographic) {
                                                 std::vector<double>& errors) {
       appendErrors(drawCache(halfAnnulusCache(faults::isWholeSweep() ? 128 : 96),
                              KnownFunction::of(function).table, camera, knownFrame(size)),
-                   marched(*scene, function, camera, size), errors);
+                   marchedScene(*scene, function, camera, size), errors);
     };
     const Camera whole = perspectiveCamera(angle);
     std::vector<double> orthographic, perspective;
@@ -231,7 +231,7 @@ TEST_F(FidelityProperties, ACameraInsideSeesWhatIsThere) {
     for (const std::string function : {angle > 90 ? "smooth" : "band"}) {
       const Image picture =
           drawCache(halfAnnulusCache(), KnownFunction::of(function).table, camera, knownFrame(kSize));
-      const Image reference = marched(*scene, function, camera, kSize, 2.6e-4);
+      const Image reference = marchedScene(*scene, function, camera, kSize, 2.6e-4);
       const double db = compareImages(picture, reference).psnr_db;
       fmt::print("inside, {} degrees, {}: {:.1f} dB\n", angle, function, db);
       EXPECT_GE(db, 40);

@@ -24,7 +24,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{256, 256};
+constexpr ImageSize kSurfacePicture{256, 256};
 const glm::vec3 kGrey{0.6f, 0.7f, 0.8f};
 // A plane across the half-annulus, obliquely.
 const ClipPlane kPlane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
@@ -69,13 +69,13 @@ class Surfaces : public testing::Test {
   /// The mean of `rays` x `rays` rays a pixel; or one ray for one pixel of `every` along x and y.
   Image marched(const KnownFunction& function, const ReferenceLayers& layers, int rays = 1,
                 int every = 1) const {
-    const ImageSize size{rays * kSize.width, rays * kSize.height};
+    const ImageSize size{rays * kSurfacePicture.width, rays * kSurfacePicture.height};
     MarchSteps steps = stepsFor(field_);
     steps.every = every;
     const Image image =
         toImage(referenceMarch(field_, function.exact, camera_, size, steps, {nullptr, layers}));
     if (rays == 1) return image;
-    Image mean(kSize);
+    Image mean(kSurfacePicture);
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x)
         for (int c = 0; c < 4; ++c)
@@ -84,7 +84,7 @@ class Surfaces : public testing::Test {
   }
 
   static double voxelOf(double pixels) {
-    return pixels * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
+    return pixels * 2 * halfAnnulusCamera().parallel_scale / kSurfacePicture.height;
   }
 
   /// Least decibels at the finest level, 4 and 8 pixels; dropping splats by their centres must miss each.
@@ -99,8 +99,8 @@ class Surfaces : public testing::Test {
       options.scene = scene;
       options.voxel = std::array{0.0, voxelOf(4), voxelOf(8)}[level];
       const auto db = [&] {
-        return compareWithReference(drawDirectly(source_, 0, options, function.table, camera_, kSize),
-                                    reference)
+        return compareWithReference(
+                   drawDirectly(source_, 0, options, function.table, camera_, kSurfacePicture), reference)
             .psnr_db;
       };
       const double cut = db();
@@ -222,7 +222,7 @@ TEST_F(Surfaces, SlicesHaveTheScalarsColours) {
   const TransferFunction function(grey, &range, 1);
   const auto slice = sliceLayer(field_, exact, kPlane.point, kPlane.normal);
   const Image reference =
-      toImage(referenceMarch(field_, exact, camera_, kSize, stepsFor(field_), {nullptr, slice}));
+      toImage(referenceMarch(field_, exact, camera_, kSurfacePicture, stepsFor(field_), {nullptr, slice}));
   const auto scene = std::make_shared<SurfaceScene>();
   scene->slices = {kPlane};
   scene->volume = false;
@@ -237,7 +237,7 @@ TEST_F(Surfaces, SlicesHaveTheScalarsColours) {
     options.voxel = voxelOf(level.pixels);
     const SceneGridSource source(annulus_, {128, 64, 64}, 4);
     const auto db = [&] {
-      const Image picture = drawDirectly(source, 0, options, function, camera_, kSize);
+      const Image picture = drawDirectly(source, 0, options, function, camera_, kSurfacePicture);
       return -20 * std::log10(rmsInside(picture, reference, slice, camera_, level.margin));
     };
     const double all = db();
@@ -276,7 +276,8 @@ TEST_F(Surfaces, IsosurfacesAreOfOneField) {
       options.scene = scene;
       options.voxel = voxelOf(level.pixels);
       options.isosurfaces = corrections;
-      return compareImages(drawDirectly(source, 0, options, function.table, camera_, kSize), reference)
+      return compareImages(drawDirectly(source, 0, options, function.table, camera_, kSurfacePicture),
+                           reference)
           .psnr_db;
     };
     const double all = db({});
@@ -302,7 +303,7 @@ TEST_F(Surfaces, TranslucentSlicesLieInTheVolume) {
   const Image reference = marched(function, slice);
   DirectOptions options;
   options.scene = scene;
-  const Image picture = drawDirectly(source_, 0, options, function.table, camera_, kSize);
+  const Image picture = drawDirectly(source_, 0, options, function.table, camera_, kSurfacePicture);
   EXPECT_LT(rmsInside(picture, reference, slice, camera_, 1), 1.5e-3);
 }
 

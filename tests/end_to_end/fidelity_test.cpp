@@ -301,9 +301,9 @@ TEST_F(CellFidelity, IsNearThatOfNodes) {
 }
 
 // A plane across the half-annulus, obliquely.
-const ClipPlane kPlane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
+const ClipPlane kObliquePlane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
 
-struct Row {
+struct LeastFidelity {
   const char* function;
   std::array<double, 3> least_db;  // finest, 4 pixels, 8 pixels
 
@@ -334,9 +334,10 @@ class AroundTheVolume : public testing::Test {
 };
 
 TEST_F(AroundTheVolume, APlaneCutsTheSplats) {
-  const ClippedField clipped(field_, {kPlane});
-  for (const Row& row :
-       {Row{"smooth", {71, 58, 50.5}}, Row{"band", {60, 51.5, 42.5}}, Row{"step", {59.5, 49, 38.5}}}) {
+  const ClippedField clipped(field_, {kObliquePlane});
+  for (const LeastFidelity& row :
+       {LeastFidelity{"smooth", {71, 58, 50.5}}, LeastFidelity{"band", {60, 51.5, 42.5}},
+        LeastFidelity{"step", {59.5, 49, 38.5}}}) {
     if (!row.isTried()) continue;
     const auto& [name, least_db] = row;
     const KnownFunction function = KnownFunction::of(name);
@@ -344,7 +345,7 @@ TEST_F(AroundTheVolume, APlaneCutsTheSplats) {
     for (size_t level = 0; level < 3; ++level) {
       if (level == 1 && !faults::isWholeSweep()) continue;
       DirectOptions options = atLevel(level);
-      options.clip_planes = {kPlane};
+      options.clip_planes = {kObliquePlane};
       const double cut = db(options, function, reference);
       options.cut_splats = false;
       const double by_centre = db(options, function, reference);
@@ -357,8 +358,9 @@ TEST_F(AroundTheVolume, APlaneCutsTheSplats) {
 
 TEST_F(AroundTheVolume, LightIsFromEachSplatsGradient) {
   const ReferenceLight truth;
-  for (const Row& row :
-       {Row{"smooth", {66, 54, 47}}, Row{"band", {65, 52, 40.5}}, Row{"step", {54, 43.5, 33}}}) {
+  for (const LeastFidelity& row :
+       {LeastFidelity{"smooth", {66, 54, 47}}, LeastFidelity{"band", {65, 52, 40.5}},
+        LeastFidelity{"step", {54, 43.5, 33}}}) {
     if (!row.isTried()) continue;
     const auto& [name, least_db] = row;
     const KnownFunction function = KnownFunction::of(name);

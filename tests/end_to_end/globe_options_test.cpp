@@ -22,10 +22,10 @@ namespace {
 
 using Index = std::vector<size_t>;
 constexpr auto kDouble = NetcdfNumbers::kDoublePrecision;
-constexpr Globe kGlobe{Globe::Shape::kSphere, 6371, 20, 0};
+constexpr Globe kEarth{Globe::Shape::kSphere, 6371, 20, 0};
 
 /// A sea of 20 x 16 degrees, 4 km deep, at three times, six hours apart; in each of two caches.
-class GlobeOptions : public ProgramSuite<GlobeOptions> {
+class GlobePictures : public ProgramSuite<GlobePictures> {
  protected:
   static void prepare() {
     writeSea(*folder_ / "sea.nc");
@@ -90,8 +90,8 @@ class GlobeOptions : public ProgramSuite<GlobeOptions> {
   }
 };
 
-TEST_F(GlobeOptions, TheCacheKeepsItsGlobe) {
-  EXPECT_EQ(readManifest(file("sea.splats")).globe, kGlobe);
+TEST_F(GlobePictures, TheCacheKeepsItsGlobe) {
+  EXPECT_EQ(readManifest(file("sea.splats")).globe, kEarth);
   const auto flat = readManifest(file("flat.splats")).globe;
   ASSERT_TRUE(flat.has_value());
   EXPECT_EQ(flat->shape, Globe::Shape::kFlat);
@@ -99,7 +99,7 @@ TEST_F(GlobeOptions, TheCacheKeepsItsGlobe) {
   EXPECT_EQ(flat->vertical_scale, 20);
 }
 
-TEST_F(GlobeOptions, LinesLieWhereTheGridIs) {
+TEST_F(GlobePictures, LinesLieWhereTheGridIs) {
   for (const std::string cache : {"sea", "flat"}) {
     const Globe globe = *readManifest(file(cache + ".splats")).globe;
     std::string world = "x,y,z,id\n";
@@ -122,7 +122,7 @@ TEST_F(GlobeOptions, LinesLieWhereTheGridIs) {
   run({"render", file("shell.splats"), "-o", file("a.png"), "--lines", file("drift.nc"), "--globe", "1,20"});
 }
 
-TEST_F(GlobeOptions, TrajectoriesFollowTheTimeOfThePicture) {
+TEST_F(GlobePictures, TrajectoriesFollowTheTimeOfThePicture) {
   const std::string east = csv("east.csv",
                                "lon,lat,depth\n0,45,500\n1,45,500\n2,45,500\n3,45,500\n"
                                "4,45,500\n5,45,500\n6,45,500\n\n12,53,0\n12,53,10\n12,53,20\n12,53,30\n");
@@ -163,7 +163,7 @@ TEST_F(GlobeOptions, TrajectoriesFollowTheTimeOfThePicture) {
                 {"--lines-time needs lines or points: --lines FILE"});
 }
 
-TEST_F(GlobeOptions, MapsAreDrawnAroundTheData) {
+TEST_F(GlobePictures, MapsAreDrawnAroundTheData) {
   const auto map = [](double west) {
     return fmt::format(R"({{"type": "LineString", "coordinates": [[{0}, 50], [{1}, 50]]}})", west,
                        west + 0.5);
@@ -178,8 +178,8 @@ TEST_F(GlobeOptions, MapsAreDrawnAroundTheData) {
             picture({"--lines", near, "--lines", file("drift.nc")}).rgba);
 }
 
-TEST_F(GlobeOptions, ACameraLooksDownAtAPlace) {
-  const glm::dvec3 column = kGlobe.column(5, 48), north = kGlobe.column(5, 138);
+TEST_F(GlobePictures, ACameraLooksDownAtAPlace) {
+  const glm::dvec3 column = kEarth.column(5, 48), north = kEarth.column(5, 138);
   const auto text = [](const glm::dvec3& v) { return fmt::format("{},{},{}", v.x, v.y, v.z); };
   const auto with = [&](const Words& camera) {
     return pictureOf(file("sea.splats"), file("a.pfm"), camera, "160x120").rgba;
@@ -200,7 +200,7 @@ TEST_F(GlobeOptions, ACameraLooksDownAtAPlace) {
           "--look-at cannot be combined with --view");
 }
 
-TEST_F(GlobeOptions, TheAxesGridHasLongitudesLatitudesAndDepths) {
+TEST_F(GlobePictures, TheAxesGridHasLongitudesLatitudesAndDepths) {
   const auto grid = [](const std::string& cache, const Words& more) {
     return pictureOf(file(cache + ".splats"), file("a.pfm"),
                      Words{"--look-at", "5,48", "--from-height", "6000", "--volume", "off", "--background",
@@ -249,7 +249,7 @@ std::string mapOfSquares(const std::string& file) {
   return file;
 }
 
-TEST_F(GlobeOptions, AnImageOfTheEarthLiesWhereItsPlacesAre) {
+TEST_F(GlobePictures, AnImageOfTheEarthLiesWhereItsPlacesAre) {
   const std::string map = mapOfSquares(file("map.png"));
   const auto middle = [&](const std::string& cache, const std::string& place, const Words& more = {}) {
     const Image drawn = pictureOf(
@@ -271,7 +271,7 @@ TEST_F(GlobeOptions, AnImageOfTheEarthLiesWhereItsPlacesAre) {
   EXPECT_LT(compareImages(picture({"--map", map, "--map-height", "20"}), lowest).psnr_db, kSame);
 }
 
-TEST_F(GlobeOptions, TheEarthHidesWhatIsBehindIt) {
+TEST_F(GlobePictures, TheEarthHidesWhatIsBehindIt) {
   const auto seen = [](const Words& more) {
     return pictureOf(file("sea.splats"), file("a.pfm"),
                      Words{"--volume", "off", "--position", "30000,0,0", "--focal-point", "0,0,0",
@@ -343,7 +343,7 @@ TEST_F(GlobeOptions, TheEarthHidesWhatIsBehindIt) {
 }
 
 /// A place at either side of the Earth.
-TEST_F(GlobeOptions, WithTheEarthThePictureLooksDownAtTheData) {
+TEST_F(GlobePictures, WithTheEarthThePictureLooksDownAtTheData) {
   for (const double west : {-145.0, 35.0, 120.0}) {
     writeSea(file("far.nc"), west, west < 0 ? -48 : 20);
     const std::string name = file(fmt::format("far{}.splats", west));
@@ -355,7 +355,7 @@ TEST_F(GlobeOptions, WithTheEarthThePictureLooksDownAtTheData) {
   }
 }
 
-TEST_F(GlobeOptions, LayersThatAreSeenAsOneAreExplained) {
+TEST_F(GlobePictures, LayersThatAreSeenAsOneAreExplained) {
   writeSea(*folder_ / "layers.nc", -5, 40, 0);
   run({"convert", file("layers.nc"), "-o", file("layers.splats")});
   expectSays(run({"render", file("layers.splats"), "-o", file("a.png"), "--size", "200x160"}).err,
@@ -363,7 +363,7 @@ TEST_F(GlobeOptions, LayersThatAreSeenAsOneAreExplained) {
              "--vertical-scale 50; or try --range 1%,99%");
 }
 
-TEST_F(GlobeOptions, HeightsAreStretchedAtDrawing) {
+TEST_F(GlobePictures, HeightsAreStretchedAtDrawing) {
   // The flat map was converted with 20.
   const auto flat = [](const Words& more) {
     return pictureOf(

@@ -24,8 +24,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{256, 256};
-const glm::vec3 kGrey{0.6f, 0.7f, 0.8f};
+constexpr ImageSize kCylinderPicture{256, 256};
+const glm::vec3 kCylinderColour{0.6f, 0.7f, 0.8f};
 constexpr double kInner = 0.3;
 
 /// The half-annulus's inner cylinder, jmin, lit from where the viewer is.
@@ -41,22 +41,23 @@ std::vector<ReferenceLayer> innerWall(const Scene& scene, const glm::dvec3& orig
     const glm::dvec3 at = origin + distance * direction;
     const glm::dvec3 normal = glm::dvec3(at.x, at.y, 0) / kInner;
     if (!scene.contains(at + 1e-9 * normal)) continue;
-    const glm::dvec3 colour = (0.3 + 0.7 * std::abs(glm::dot(normal, direction))) * glm::dvec3(kGrey);
+    const glm::dvec3 colour =
+        (0.3 + 0.7 * std::abs(glm::dot(normal, direction))) * glm::dvec3(kCylinderColour);
     return {{distance, colour, 1}};
   }
   return {};
 }
 
 /// The mean of 2 x 2 rays a pixel.
-Image marched(const Scene& scene, const KnownFunction& function, const Camera& camera) {
+Image marchedCylinder(const Scene& scene, const KnownFunction& function, const Camera& camera) {
   const SceneField field(scene);
-  const ImageSize size{2 * kSize.width, 2 * kSize.height};
+  const ImageSize size{2 * kCylinderPicture.width, 2 * kCylinderPicture.height};
   const Image image =
       toImage(referenceMarch(field, function.exact, camera, size, stepsFor(field),
                              {nullptr, [&](const glm::dvec3& origin, const glm::dvec3& direction) {
                                 return innerWall(scene, origin, direction);
                               }}));
-  Image mean(kSize);
+  Image mean(kCylinderPicture);
   for (int y = 0; y < size.height; ++y)
     for (int x = 0; x < size.width; ++x)
       for (int c = 0; c < 4; ++c) mean.pixel(x / 2, y / 2)[c] += image.pixel(x, y)[c] / 4;
@@ -67,7 +68,7 @@ std::shared_ptr<SurfaceScene> sceneOfFace(const std::filesystem::path& cache, in
   auto scene = std::make_shared<SurfaceScene>();
   GridSurface& surface = scene->grid_surfaces.emplace_back();
   surface.faces = FacesReader::open(cache, CacheReader(cache).manifest());
-  surface.colour = kGrey;
+  surface.colour = kCylinderColour;
   for (uint32_t n = 0; n < surface.faces->faces().size(); ++n) {
     const GridFace& face = surface.faces->faces()[n];
     if (face.axis == axis && face.side == side)
@@ -82,8 +83,8 @@ TEST(GridSurfaces, AWallOfTheGridLiesInTheVolume) {
   const auto cache = folder / "a.splats";
   convertGrid(SceneGridSource(annulus, {256, 32, 128}), cache);
   const KnownFunction function = KnownFunction::of("smooth");
-  const Image reference = marched(*annulus, function, halfAnnulusCamera());
-  FrameOptions options = knownFrame(kSize);
+  const Image reference = marchedCylinder(*annulus, function, halfAnnulusCamera());
+  FrameOptions options = knownFrame(kCylinderPicture);
   options.scene = sceneOfFace(cache, 1, FaceSide::kMin);
   const struct { double lod, least_db; } levels[] = {{0, 48.5}, {1, 48.5}, {4, 45}};
   for (const auto& level : levels) {
@@ -128,7 +129,7 @@ TEST(GridSurfaces, LevelsMeetWithoutGaps) {
   const TemporaryFolder folder;
   const auto cache = folder / "a.splats";
   convertGrid(SceneGridSource(makeScene("half-annulus"), {600, 4, 400}), cache);
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kCylinderPicture);
   auto scene = sceneOfFace(cache, 1, FaceSide::kMax);
   scene->volume = false;
   options.scene = scene;
@@ -139,7 +140,7 @@ TEST(GridSurfaces, LevelsMeetWithoutGaps) {
   camera.position = {-0.5, 0.2, 0.4};
   camera.focal_point = {-1, 0, 0.5};
   camera.view_up = {0, 0, 1};
-  const ScreenView view = ScreenView::of(camera, kSize, glm::dvec3(1.0), kLowPass, 1e-3);
+  const ScreenView view = ScreenView::of(camera, kCylinderPicture, glm::dvec3(1.0), kLowPass, 1e-3);
   std::set<std::array<uint32_t, 2>> strides;
   for (const auto& [part, patch] : choosePatches(scene->grid_surfaces[0], view, 6, 1 << 24))
     strides.insert(scene->grid_surfaces[0].faces->patches()[patch].stride);
@@ -148,8 +149,8 @@ TEST(GridSurfaces, LevelsMeetWithoutGaps) {
   options.lod_pixels = 0.5;
   const Image fine = drawCache(cache, KnownFunction::of("smooth").table, camera, options);
   size_t gaps = 0;
-  for (int y = 0; y < kSize.height; ++y)
-    for (int x = 0; x < kSize.width; ++x)
+  for (int y = 0; y < kCylinderPicture.height; ++y)
+    for (int x = 0; x < kCylinderPicture.width; ++x)
       gaps += fine.pixel(x, y)[0] < 0.97f && picture.pixel(x, y)[0] > 0.97f;
   EXPECT_EQ(gaps, 0u);
   EXPECT_GT(compareImages(picture, fine).psnr_db, 35);

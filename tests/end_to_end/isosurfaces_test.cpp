@@ -29,7 +29,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{256, 256};
+constexpr ImageSize kIsoPicture{256, 256};
 constexpr double kValue = 0.5;
 
 class Isosurfaces : public ProgramSuite<Isosurfaces> {
@@ -46,12 +46,12 @@ class Isosurfaces : public ProgramSuite<Isosurfaces> {
     constexpr int kFine = 3;
     MarchSteps steps = stepsFor(field);
     if (exact(kValue).extinction == 0) steps.step = 1;  // the surface alone, whose places are exact
-    const Image fine =
-        toImage(referenceMarch(field, exact, halfAnnulusCamera(), {kFine * kSize.width, kFine * kSize.height},
-                               steps, {nullptr, isoLayer(*annulus_, kValue, colour, opacity)}));
-    Image image(kSize);
-    for (int y = 0; y < kFine * kSize.height; ++y)
-      for (int x = 0; x < kFine * kSize.width; ++x)
+    const Image fine = toImage(referenceMarch(field, exact, halfAnnulusCamera(),
+                                              {kFine * kIsoPicture.width, kFine * kIsoPicture.height}, steps,
+                                              {nullptr, isoLayer(*annulus_, kValue, colour, opacity)}));
+    Image image(kIsoPicture);
+    for (int y = 0; y < kFine * kIsoPicture.height; ++y)
+      for (int x = 0; x < kFine * kIsoPicture.width; ++x)
         for (size_t c = 0; c < 4; ++c)
           image.pixel(x / kFine, y / kFine)[c] += fine.pixel(x, y)[c] / (kFine * kFine);
     return image;
@@ -84,7 +84,7 @@ class Isosurfaces : public ProgramSuite<Isosurfaces> {
     return off;
   }
 
-  ImageSize size_ = kSize;  // of what is drawn
+  ImageSize size_ = kIsoPicture;  // of what is drawn
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
 };
 

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void along(const GridNode& node, NodeValues& values) {
+void alongI(const GridNode& node, NodeValues& values) {
   values.scalars[0] = static_cast<float>(node.i);
 }
 
@@ -27,8 +27,8 @@ TEST(OddPaths, WorkEverywhere) {
   const std::string cache = inside / "ο cube.splats", picture = inside / "π %.png",
                     stats = inside / "s tats ü.json";
   const std::string scalar = "rho*u/ρ", added = "../../a \"b\"\\ü";
-  writeCube(inside / "ο cube", 8, along, scalar);
-  writeCube(inside / "other ö", 8, along, added);
+  writeCube(inside / "ο cube", 8, alongI, scalar);
+  writeCube(inside / "other ö", 8, alongI, added);
   run(cubeArguments(inside / "ο cube", {"--scalar", scalar, "--stats", stats}));
   EXPECT_TRUE(jsonOf(stats)["files"].contains("var.0.bin"));
 
@@ -60,7 +60,7 @@ TEST(OddPaths, WorkEverywhere) {
 TEST(OddPaths, WorkWithoutAValidEncoding) {
   const TemporaryFolder folder;
   const fs::path prefix = folder / "lat\xfcn";
-  writeCube(prefix, 8, along, "r\xfc");
+  writeCube(prefix, 8, alongI, "r\xfc");
   const std::string cache = prefix.string() + ".splats", stats = prefix.string() + ".json";
   run(cubeArguments(prefix, {"--stats", stats}));
   run({"render", cache, "-o", prefix.string() + ".png", "--size", "9x9", "--scalar-bar", "--stats", stats});
@@ -74,7 +74,7 @@ class ReadOnlyTest : public ProgramTest {
   void SetUp() override {
     fs::create_directory(readOnly());
     fs::create_directory(folder_ / "rw");
-    writeCube(readOnly() / "cube", 8, along);
+    writeCube(readOnly() / "cube", 8, alongI);
     run(cubeArguments(readOnly() / "cube"));
     setWritable(false);
     const ProgramResult touched = runBound({"touch", readOnly() / "x"});

@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-const glm::dvec3 kScale(1, 0.5, 3);
+const glm::dvec3 kStretch(1, 0.5, 3);
 
 /// The scene with its coordinates stretched, as another grid.
 class StretchedSource : public GridSource {
@@ -31,9 +31,9 @@ class StretchedSource : public GridSource {
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override {
     source_.read(block, box, scalars, out);
-    for (double& x : out.x) x *= kScale.x;
-    for (double& y : out.y) y *= kScale.y;
-    for (double& z : out.z) z *= kScale.z;
+    for (double& x : out.x) x *= kStretch.x;
+    for (double& y : out.y) y *= kStretch.y;
+    for (double& z : out.z) z *= kStretch.z;
   }
 
  private:
@@ -144,7 +144,8 @@ TEST_F(RenderOptions, ClipBoxLeavesTheRestEmpty) {
 }
 
 TEST_F(RenderOptions, ScaleIsTheScaledGrid) {
-  const Image scaled = render({"--scale", fmt::format("{},{},{}", kScale.x, kScale.y, kScale.z)}, "a.exr");
+  const Image scaled =
+      render({"--scale", fmt::format("{},{},{}", kStretch.x, kStretch.y, kStretch.z)}, "a.exr");
   const Image grid = render({}, "b.exr", "stretched");
   // Cells grow by other factors in the stretched grid, whose splats are moved and skewed by that.
   EXPECT_GT(compareImages(scaled, grid).psnr_db, 46);

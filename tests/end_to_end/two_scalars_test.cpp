@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{256, 256}, kSmall{128, 128};
+constexpr ImageSize kLarge{256, 256}, kSmall{128, 128};
 
 /// The scalar of the colours.
 double hueAt(const glm::dvec3& at) {
@@ -67,7 +67,7 @@ class TwoScalarsTest : public ProgramSuite<TwoScalarsTest> {
   }
 
   Image marched(const OpticalFunction& opacity, const ReferenceField& field,
-                const ReferenceLayers& layers = {}, ImageSize size = kSize) const {
+                const ReferenceLayers& layers = {}, ImageSize size = kLarge) const {
     const TwoScalars scalars{opacity, [](const glm::dvec3& at) { return hues().at(hueAt(at)).colour; }};
     MarchSteps steps = stepsFor(field);
     steps.every = faults::isWholeSweep() ? 1 : size.width / kSmall.width;
@@ -100,7 +100,7 @@ TEST_F(TwoScalarsTest, AreThoseOfTheRayMarchAtAllLevels) {
       // Usually the smooth function where the picture is finest and coarsest, and the others at one level each.
       const bool is_usual = name == "smooth" ? level != 1 : level == (name == "band" ? 1 : 2);
       if (!is_usual && !faults::isWholeSweep()) continue;
-      FrameOptions options = knownFrame(kSize);
+      FrameOptions options = knownFrame(kLarge);
       options.lod_pixels = std::array{0.0, 4.0, 8.0}[level];
       const double all = db(drawn(function.table, options), reference);
       options.classification = Classification::kFlat;
@@ -117,7 +117,7 @@ TEST_F(TwoScalarsTest, AreCutByClipPlanes) {
   const ClipPlane plane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
   const KnownFunction function = KnownFunction::of("smooth");
   const Image reference = marched(function.exact, ClippedField(field_, {plane}));
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   options.clip_planes = {plane};
   for (const double lod : {0.0, 4.0}) {
     options.lod_pixels = lod;
@@ -138,7 +138,7 @@ TEST_F(TwoScalarsTest, SlicesHaveTheColours) {
     return found;
   };
   const Image reference = marched(function.exact, field_, layers);
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   auto scene = std::make_shared<SurfaceScene>();
   scene->slices = {{point, normal}};
   scene->slice_opacity = 0.6;
@@ -162,7 +162,7 @@ TEST_F(TwoScalarsTest, SlicesHaveTheOpacitiesOfTheOther) {
     return found;
   };
   const Image reference = marched(function.exact, field_, layers);
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   auto scene = std::make_shared<SurfaceScene>();
   scene->slices = {{point, normal}};
   options.scene = scene;
@@ -202,7 +202,7 @@ TEST_F(TwoScalarsTest, SurfacesHaveTheOpacitiesOfTheOther) {
     return found;
   };
   const Image reference = marched(function.exact, field_, layers);
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   auto scene = std::make_shared<SurfaceScene>();
   GridSurface& surface = scene->grid_surfaces.emplace_back();
   surface.faces = FacesReader::open(*folder_ / "a.splats", CacheReader(*folder_ / "a.splats").manifest());
@@ -323,7 +323,7 @@ TEST_F(TwoScalarsTest, IsosurfacesOfAnotherHaveTheOpacitiesOfTheOneScalar) {
                   }});
   const OpticalFunction nothing = [](double) { return OpticalProperties{}; };
   const Image reference = marched(nothing, field_, layers);
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   auto scene = std::make_shared<SurfaceScene>();
   scene->further_isosurfaces = {{1, {kValue}, {glm::vec3(0.5f)}}};
   scene->iso_opacity = {0.9, true};
@@ -337,7 +337,7 @@ TEST_F(TwoScalarsTest, IsosurfacesOfAnotherHaveTheOpacitiesOfTheOneScalar) {
 /// Bricks are left out by the bounds of the isosurface's scalar, not of the other's.
 TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
   convertTo("far.splats", 10, {40, 24, 24});
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   const auto sceneWith = [](double isovalue) {
     auto scene = std::make_shared<SurfaceScene>();
     scene->further_isosurfaces = {{1, {isovalue}}};
@@ -357,7 +357,7 @@ TEST_F(TwoScalarsTest, IsosurfacesAreThereWhereTheRangesDoNotMeet) {
 
 TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
   // Where the isosurface of the one scalar is, the other's colours are.
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   auto scene = std::make_shared<SurfaceScene>();
   scene->isovalues = {0.5};
   scene->volume = false;
@@ -373,10 +373,10 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
   const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.view_up)),
                    up = glm::cross(right, forward);
   size_t compared = 0, wrong = 0;
-  for (int y = 8; y < kSize.height; y += 8)
-    for (int x = 8; x < kSize.width; x += 8) {
-      const double across = camera.parallel_scale * (2 * (x + 0.5) - kSize.width) / kSize.height;
-      const double upwards = camera.parallel_scale * (kSize.height - 2 * (y + 0.5)) / kSize.height;
+  for (int y = 8; y < kLarge.height; y += 8)
+    for (int x = 8; x < kLarge.width; x += 8) {
+      const double across = camera.parallel_scale * (2 * (x + 0.5) - kLarge.width) / kLarge.height;
+      const double upwards = camera.parallel_scale * (kLarge.height - 2 * (y + 0.5)) / kLarge.height;
       const glm::dvec3 origin = camera.position + across * right + upwards * up;
       std::optional<glm::dvec3> first;
       for (double t = 0; t < 12 && !first; t += 0.002) {
@@ -400,7 +400,7 @@ TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
 
 TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
   const TransferFunction opacity = KnownFunction::of("smooth").table;
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kLarge);
   options.lod_pixels = 8;  // OpenGL takes a second for a hundred thousand splats
   options.size = {128, 128};
   for (const bool full : {false, true}) {

@@ -19,7 +19,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{128, 128};
+constexpr ImageSize kChannelPicture{128, 128};
 
 struct At {
   double depth = 0, scalar = 0;
@@ -58,8 +58,8 @@ class ValueChannelsTest : public ProgramSuite<ValueChannelsTest> {
     const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
     const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.view_up)),
                      up = glm::cross(right, forward);
-    const double across = (2 * (x + 0.5) - kSize.width) / kSize.height;
-    const double upwards = (kSize.height - 2 * (y + 0.5)) / kSize.height;
+    const double across = (2 * (x + 0.5) - kChannelPicture.width) / kChannelPicture.height;
+    const double upwards = (kChannelPicture.height - 2 * (y + 0.5)) / kChannelPicture.height;
     if (camera.projection == Projection::kOrthographic)
       return {camera.position + camera.parallel_scale * (across * right + upwards * up), forward};
     const double half = std::tan(0.5 * camera.view_angle_deg * std::numbers::pi / 180);
@@ -88,11 +88,11 @@ class ValueChannelsTest : public ProgramSuite<ValueChannelsTest> {
   std::array<double, 3> errors(const PixelValues& values, const Camera& camera,
                                const std::function<double(const glm::dvec3&)>& kappa) const {
     std::array<std::vector<double>, 3> all;
-    for (int y = 4; y < kSize.height; y += 8)
-      for (int x = 4; x < kSize.width; x += 8) {
+    for (int y = 4; y < kChannelPicture.height; y += 8)
+      for (int x = 4; x < kChannelPicture.width; x += 8) {
         const auto [origin, direction] = rayOf(camera, x, y);
         const auto exact = halfAlong(kappa, origin, direction);
-        const size_t n = static_cast<size_t>(y * kSize.width + x);
+        const size_t n = static_cast<size_t>(y * kChannelPicture.width + x);
         if (!exact || !std::isfinite(values.depth[n])) continue;
         all[0].push_back(std::abs(values.depth[n] - exact->depth));
         all[1].push_back(std::abs(values.scalar[n] - exact->scalar));
@@ -123,7 +123,7 @@ TEST_F(ValueChannelsTest, AreThoseOfTheRaysInTheVolume) {
       const auto kappa = [&](const glm::dvec3& at) {
         return function.exact(annulus_->scalar(at)).extinction;
       };
-      FrameOptions options = knownFrame(kSize);
+      FrameOptions options = knownFrame(kChannelPicture);
       const auto [depth, scalar, angle] = errors(drawn(function.table, options, camera), camera, kappa);
       fmt::print("{}: depth {:.4f}, scalar {:.4f}, normal {:.2f} degrees\n", name, depth, scalar, angle);
       EXPECT_LT(depth, 0.012);
@@ -133,7 +133,7 @@ TEST_F(ValueChannelsTest, AreThoseOfTheRaysInTheVolume) {
 }
 
 TEST_F(ValueChannelsTest, AreThoseOfAnIsosurface) {
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kChannelPicture);
   auto scene = std::make_shared<SurfaceScene>();
   scene->isovalues = {0.5};
   options.scene = scene;
@@ -161,15 +161,15 @@ TEST_F(ValueChannelsTest, AreThoseOfASurfaceInFrontOfTheHalf) {
   RawMesh raw{{point - u - v, point + u - v, point + u + v, point - u + v}, {{0, 1, 2}, {0, 2, 3}}};
   scene->surfaces.push_back({std::make_shared<TriangleMesh>(meshOf(std::move(raw))), glm::vec3(0.5f)});
   scene->volume = false;
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kChannelPicture);
   options.scene = scene;
   const Camera camera = perspectiveCamera();
   const PixelValues values = drawn(KnownFunction::of("smooth").table, options, camera);
-  for (int y = 4; y < kSize.height; y += 8)
-    for (int x = 4; x < kSize.width; x += 8) {
+  for (int y = 4; y < kChannelPicture.height; y += 8)
+    for (int x = 4; x < kChannelPicture.width; x += 8) {
       const auto [origin, direction] = rayOf(camera, x, y);
       const double t = glm::dot(n, point - origin) / glm::dot(n, direction);
-      const size_t at = static_cast<size_t>(y * kSize.width + x);
+      const size_t at = static_cast<size_t>(y * kChannelPicture.width + x);
       if (t < 0) continue;
       EXPECT_NEAR(values.depth[at], t, 1e-3 * t) << x << ' ' << y;
       EXPECT_GT(std::abs(glm::dot(glm::dvec3(values.normal[at]), n)), 0.999) << x << ' ' << y;
@@ -179,7 +179,7 @@ TEST_F(ValueChannelsTest, AreThoseOfASurfaceInFrontOfTheHalf) {
 
 TEST_F(ValueChannelsTest, ThePictureAndTheValuesDoNotDependOnThreads) {
   const TransferFunction function = KnownFunction::of("smooth").table;
-  FrameOptions options = knownFrame(kSize);
+  FrameOptions options = knownFrame(kChannelPicture);
   Image picture;
   const PixelValues values = drawn(function, options, halfAnnulusCamera(), &picture);
   const Image plain = drawCache(*folder_ / "a.splats", function, halfAnnulusCamera(), options);

@@ -18,7 +18,7 @@
 namespace curvisplat {
 namespace {
 
-enum Flags : uint8_t { kOwnHeader = 1, kDisjoint = 2, kFullOctants = 4, kPerspective = 8, kLimits = 16 };
+enum TableFlags : uint8_t { kOwnHeader = 1, kDisjoint = 2, kFullOctants = 4, kPerspective = 8, kLimits = 16 };
 
 struct Tables {
   std::vector<BrickRecord> bricks;

@@ -75,7 +75,7 @@ void fuzzEnsight(std::span<const std::byte> bytes) {
 
 const RegisteredFuzzTarget ensight_target("ensight", fuzzEnsight);
 
-bool writeFiles() {
+bool writeMeshFiles() {
   const auto write = [](const char* name, const std::string& text) {
     fuzzFile(name, std::as_bytes(std::span(text)));
   };
@@ -93,7 +93,7 @@ bool writeFiles() {
 // EnSight's case file, beside files that are as they should be: t.geo, t.geo0, t.geo1 (a tetrahedron), t.p,
 // t.p00, t.p01 (a value for each node), t.u (a vector for each node) and t.c (a value for the cell).
 void fuzzEnsightCase(std::span<const std::byte> bytes) {
-  [[maybe_unused]] static const bool written = writeFiles();
+  [[maybe_unused]] static const bool written = writeMeshFiles();
   OpenGridOptions options;
   options.grid = fuzzFile("t.case", bytes);
   options.temporary_folder = fuzzFolder();

@@ -21,7 +21,14 @@
 namespace curvisplat {
 namespace {
 
-enum Flags : uint8_t { kPerspective = 1, kFlat = 2, kClip = 4, kCells = 8, kLit = 16, kPlane = 32 };
+enum ProjectionFlags : uint8_t {
+  kWithPerspective = 1,
+  kFlat = 2,
+  kClip = 4,
+  kCells = 8,
+  kLit = 16,
+  kPlane = 32
+};
 
 constexpr float kLargest = std::numeric_limits<float>::max();
 
@@ -77,7 +84,7 @@ void fuzzPicture(std::span<const std::byte> bytes) {
   const ImageSize pixels{40, 24};
   const Camera camera =
       Camera::named("iso", scale * corner, scale * (corner + size), pixels,
-                    flags & kPerspective ? Projection::kPerspective : Projection::kOrthographic);
+                    flags & kWithPerspective ? Projection::kPerspective : Projection::kOrthographic);
   ProjectionSettings settings{ScreenView::of(camera, pixels, scale, kLowPass, 1e-4 * size), !(flags & kFlat)};
   if (flags & kCells) settings.borders = kWholeCellStyle;
   if (flags & kClip) settings.clip_planes = clipPlanesOf({}, WorldBox{corner, corner + 0.5 * size});

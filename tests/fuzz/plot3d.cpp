@@ -59,7 +59,7 @@ void writeFile(const char* name, const std::vector<int32_t>& head, size_t values
   fuzzFile(name, std::as_bytes(std::span(words)));
 }
 
-bool writeFiles() {
+bool writePlot3dFiles() {
   constexpr size_t kNodes = 4 * 3 * 2;
   writeFile("a.xyz", {4, 3, 2}, 3 * kNodes);
   writeFile("a.q", {4, 3, 2}, 4 + 5 * kNodes);
@@ -69,7 +69,7 @@ bool writeFiles() {
 
 // .p3d files, beside a grid and two solutions that are as they should be: a.xyz, a.q, a.f.
 void fuzzPlot3dMeta(std::span<const std::byte> bytes) {
-  [[maybe_unused]] static const bool written = writeFiles();
+  [[maybe_unused]] static const bool written = writePlot3dFiles();
   OpenGridOptions options;
   options.grid = fuzzFile("a.p3d", bytes);
   options.temporary_folder = fuzzFolder();

@@ -20,13 +20,13 @@
 namespace curvisplat {
 namespace {
 
-struct Shape {
+struct CellExample {
   CellKind kind;
   std::vector<glm::dvec3> corners;
 };
 
-const std::vector<Shape>& shapes() {
-  static const std::vector<Shape> all{
+const std::vector<CellExample>& shapes() {
+  static const std::vector<CellExample> all{
       {CellKind::kPyramid, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5, 0.5, 1}}},
       {CellKind::kWedge, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}}},
       {CellKind::kHexahedron,
@@ -37,7 +37,8 @@ const std::vector<Shape>& shapes() {
 /// Four distorted cells of a shape, with values.
 class FourCells {
  public:
-  FourCells(const Shape& shape, size_t fields, std::mt19937& random) : kind_(shape.kind), fields_(fields) {
+  FourCells(const CellExample& shape, size_t fields, std::mt19937& random)
+      : kind_(shape.kind), fields_(fields) {
     std::uniform_real_distribution<double> shift(-0.15, 0.15), value(-1, 1);
     for (size_t cell = 0; cell < kCellsAtOnce; ++cell) {
       const double size = std::exp(8 * value(random));
@@ -75,7 +76,7 @@ class FourCells {
 
 TEST(FourCells, HaveTheMomentsOfEachBitForBit) {
   std::mt19937 random(5);
-  for (const Shape& shape : shapes()) {
+  for (const CellExample& shape : shapes()) {
     for (size_t fields = 0; fields <= 4; ++fields) {
       ASSERT_TRUE(isTakenAtOnce(shape.kind, fields));
       for (int n = 0; n < 200; ++n) {
@@ -92,7 +93,7 @@ TEST(FourCells, HaveTheMomentsOfEachBitForBit) {
 
 TEST(FourCells, HaveTheBodyOfEachBitForBit) {
   std::mt19937 random(7);
-  for (const Shape& shape : shapes()) {
+  for (const CellExample& shape : shapes()) {
     for (int n = 0; n < 200; ++n) {
       FourCells cells(shape, 0, random);
       if (n % 10 == 0)  // a point: no volume
@@ -111,7 +112,7 @@ TEST(FourCells, HaveTheBodyOfEachBitForBit) {
 
 TEST(FourCells, WithAPieceWithoutVolumeAreLeftToOthers) {
   std::mt19937 random(6);
-  for (const Shape& shape : shapes())
+  for (const CellExample& shape : shapes())
     for (size_t cell = 0; cell < kCellsAtOnce; ++cell) {
       FourCells cells(shape, 1, random);
       for (size_t n = 0; n < cells.corners(); ++n) cells.corner(cell, n).z = 0;

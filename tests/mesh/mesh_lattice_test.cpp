@@ -20,7 +20,7 @@ namespace {
 constexpr uint64_t kPlenty = uint64_t{1} << 30;
 
 /// n x n x n cubes in a box of 2 x 1 x 1 whose cells grow with x; without those that `has` does not have.
-ArrayPiece boxes(uint64_t n, const std::function<bool(const glm::dvec3&)>& has) {
+ArrayPiece boxOfCubes(uint64_t n, const std::function<bool(const glm::dvec3&)>& has) {
   ArrayPiece piece;
   const auto x = [n](uint64_t i) { return 2 * std::pow(static_cast<double>(i) / static_cast<double>(n), 2); };
   const auto part = [n](uint64_t j) { return static_cast<double>(j) / static_cast<double>(n); };
@@ -67,7 +67,7 @@ class MeshLattice : public testing::TestWithParam<uint32_t> {  // the scalar: of
 TEST_P(MeshLattice, HasTheMeshsShapeAndValues) {
   const double hole = 2 * std::pow(21.0 / 30, 2);  // where a row of cells begins
   const auto has = [hole](const glm::dvec3& at) { return at.x < hole || at.y < 0.5; };
-  const ArrayMesh mesh({boxes(30, has)});
+  const ArrayMesh mesh({boxOfCubes(30, has)});
   const auto lattice = latticeOf(mesh, 8000);
   ASSERT_TRUE(lattice);
   const auto [arrays, block] = nodesOf(*lattice);
@@ -92,7 +92,7 @@ TEST_P(MeshLattice, HasTheMeshsShapeAndValues) {
 
 /// Half of the points have x < 0.5, a quarter of the box.
 TEST_P(MeshLattice, LinesAreDenseWhereThePointsAre) {
-  const ArrayMesh mesh({boxes(30, [](const glm::dvec3&) { return true; })});
+  const ArrayMesh mesh({boxOfCubes(30, [](const glm::dvec3&) { return true; })});
   const auto lattice = latticeOf(mesh, 27000);
   ASSERT_TRUE(lattice);
   const Nodes nodes = nodesOf(*lattice);
@@ -104,7 +104,7 @@ TEST_P(MeshLattice, LinesAreDenseWhereThePointsAre) {
 
 /// Cells of a piece number the points of their own piece.
 TEST_P(MeshLattice, HasTheValuesOfAMeshInPieces) {
-  const ArrayPiece whole = boxes(12, [](const glm::dvec3&) { return true; });
+  const ArrayPiece whole = boxOfCubes(12, [](const glm::dvec3&) { return true; });
   const ArrayMesh in_pieces(split(whole, 3, [](size_t cell) { return cell % 3; }));
   const auto lattice = latticeOf(in_pieces, 1000);
   ASSERT_TRUE(lattice);
@@ -118,16 +118,16 @@ TEST_P(MeshLattice, HasTheValuesOfAMeshInPieces) {
 }
 
 TEST_P(MeshLattice, ThereIsNoneBeyondItsMemoryOrOfAPlane) {
-  const ArrayMesh mesh({boxes(10, [](const glm::dvec3&) { return true; })});
+  const ArrayMesh mesh({boxOfCubes(10, [](const glm::dvec3&) { return true; })});
   EXPECT_FALSE(latticeOf(mesh, 1000, 1000));
-  ArrayPiece flat = boxes(10, [](const glm::dvec3&) { return true; });
+  ArrayPiece flat = boxOfCubes(10, [](const glm::dvec3&) { return true; });
   for (glm::dvec3& point : flat.points) point.z = 1;
   EXPECT_FALSE(latticeOf(ArrayMesh({flat}), 1000));
 }
 
 TEST_P(MeshLattice, IsConverted) {
   const TemporaryFolder folder;
-  const ArrayMesh mesh({boxes(20, [](const glm::dvec3& at) { return at.x < 1 || at.y < 0.5; })});
+  const ArrayMesh mesh({boxOfCubes(20, [](const glm::dvec3& at) { return at.x < 1 || at.y < 0.5; })});
   const auto lattice = latticeOf(mesh, 4096);
   ASSERT_TRUE(lattice);
   ConvertOptions options;

@@ -147,7 +147,7 @@ TEST(BlockOverlap, IsFoundWithItsVolume) {
   EXPECT_EQ(overlapsIn(source, 20'000)[0].volume, overlaps[0].volume);
 }
 
-void expectSame(const std::vector<BlockOverlap>& a, const std::vector<BlockOverlap>& b) {
+void expectSameOverlaps(const std::vector<BlockOverlap>& a, const std::vector<BlockOverlap>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (size_t n = 0; n < a.size(); ++n) {
     EXPECT_EQ(a[n].first, b[n].first);
@@ -174,7 +174,7 @@ TEST(BlockOverlap, IsTheSameWithLittleMemory) {
                                                 {30'000, 8'000'000}}) {
     if (point_bytes >= 2'000'000 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(point_bytes);
-    expectSame(overlapsIn(source, slab_bytes, point_bytes), all);
+    expectSameOverlaps(overlapsIn(source, slab_bytes, point_bytes), all);
   }
   // Rows of which not all points fit.
   const FunctionGridSource rows({gridBlock(4'001, 2, 2), gridBlock(3, 3, 3)}, 0, [](const GridNode& node) {
@@ -184,7 +184,7 @@ TEST(BlockOverlap, IsTheSameWithLittleMemory) {
   const auto of_rows = overlapsIn(rows);
   ASSERT_EQ(of_rows.size(), 1u);
   EXPECT_NEAR(of_rows[0].volume, 0.5 * 0.7 * 0.6, 0.02);
-  expectSame(overlapsIn(rows, kSlabBytes, 0), of_rows);
+  expectSameOverlaps(overlapsIn(rows, kSlabBytes, 0), of_rows);
 }
 
 TEST(BlockOverlap, InMorePairsThanFitIsRefusedWithASufficientSize) {
@@ -197,7 +197,7 @@ TEST(BlockOverlap, InMorePairsThanFitIsRefusedWithASufficientSize) {
   const std::string error = errorOf([&] { find(1 << 20); }), before = "give at least ";
   const size_t at = error.find(before);
   ASSERT_NE(at, std::string::npos) << error;
-  expectSame(find(std::stoull(error.substr(at + before.size())) << 20), all);
+  expectSameOverlaps(find(std::stoull(error.substr(at + before.size())) << 20), all);
 }
 
 TEST(BlockOverlap, OfASmallBlockWithinACellIsItsOwnVolume) {

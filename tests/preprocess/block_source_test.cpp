@@ -22,7 +22,7 @@ namespace {
 
 constexpr uint64_t kNi = 5, kNj = 4, kNk = 3;
 
-GridScalar scalarOf(const char* name, Centring centring) {
+GridScalar namedScalar(const char* name, Centring centring) {
   GridScalar scalar;
   scalar.name = name;
   scalar.centring = centring;
@@ -44,7 +44,7 @@ class NumberedBlock final : public BlockSource {
   NumberedBlock(BlockArray<float*> array, Centring centring, BlockArray<float*> iblank = {})
       : array_(std::move(array)), iblank_(std::move(iblank)) {
     description_.blocks.push_back({"block", kNi, kNj, kNk, static_cast<bool>(iblank_)});
-    description_.scalars.push_back(scalarOf("number", centring));
+    description_.scalars.push_back(namedScalar("number", centring));
     negative_is_fringe_ = true;
   }
 
@@ -152,7 +152,7 @@ class NumberedElements final : public ElementSource {
  public:
   NumberedElements() {
     description_.pieces.push_back({"piece", "memory", 10, 4});
-    description_.scalars = {scalarOf("number", Centring::kNode), scalarOf("none", Centring::kNode)};
+    description_.scalars = {namedScalar("number", Centring::kNode), namedScalar("none", Centring::kNode)};
   }
 
  private:
@@ -204,7 +204,7 @@ TEST(ElementSource, APointThatIsNoneIsRefused) {
 
 TEST(ScalarList, NoTwoScalarsHaveTheSameName) {
   GridDescription description;
-  description.scalars.push_back(scalarOf("u", Centring::kNode));
+  description.scalars.push_back(namedScalar("u", Centring::kNode));
   ScalarList list(description);
   list.add(namesOfComponent("u", "", Centring::kCell, 4), Centring::kCell);
   list.add(namesOfComponent("u", "", Centring::kCell, 5), Centring::kCell);

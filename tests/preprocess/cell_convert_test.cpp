@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-ConvertOptions optionsFor(const std::filesystem::path& output, std::vector<uint32_t> scalars) {
+ConvertOptions cellOptionsFor(const std::filesystem::path& output, std::vector<uint32_t> scalars) {
   ConvertOptions options;
   options.output = output;
   options.memory_bytes = uint64_t{1} << 30;
@@ -39,20 +39,20 @@ AddScalarReport addQuietly(const GridSource& source, const std::filesystem::path
   return addScalars(source, options, progress);
 }
 
-double field(const GridCell& cell) {
+double cellField(const GridCell& cell) {
   return std::sin(3 * cell.centre.x) * cell.centre.y + cell.centre.z;
 }
 
 /// Scalars "f" at nodes, and "c0", "c1" in cells.
 struct CellScene {
   SceneGridSource nodes{makeScene("half-annulus"), {33, 40, 37}};
-  CellGridSource source{nodes, {field, [](const GridCell& cell) { return cell.centre.x; }}};
+  CellGridSource source{nodes, {cellField, [](const GridCell& cell) { return cell.centre.x; }}};
 };
 
 TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
   const TemporaryFolder folder;
   const CellScene scene;
-  const ConvertReport report = converted(scene.source, optionsFor(folder / "c.splats", {1}));
+  const ConvertReport report = converted(scene.source, cellOptionsFor(folder / "c.splats", {1}));
   EXPECT_EQ(report.centring, Centring::kCell);
   EXPECT_EQ(report.nodes, 32u * 39 * 36);
   EXPECT_EQ(report.splats, report.nodes);
@@ -73,11 +73,12 @@ TEST(CellConvert, HasTheSameBytesForAnyThreadsAndMemory) {
   Rearrangement blocks;
   blocks.cuts = {2, 1, 3};
   const RearrangedGridSource cut(nodes, blocks);
-  const CellGridSource source(
-      cut, {[](const GridCell& cell) {
-        return cell.i + cell.j + 5 * cell.k == 50 ? std::numeric_limits<double>::quiet_NaN() : field(cell);
-      }});
-  ConvertOptions options = optionsFor(folder / "c.splats", {1});
+  const CellGridSource source(cut, {[](const GridCell& cell) {
+                                return cell.i + cell.j + 5 * cell.k == 50
+                                           ? std::numeric_limits<double>::quiet_NaN()
+                                           : cellField(cell);
+                              }});
+  ConvertOptions options = cellOptionsFor(folder / "c.splats", {1});
   options.threads = 2;
   expectSameCaches(source, options,
                    {{.threads = 1, .memory_bytes = leastMemory(1), .bucket_splats = 30'000}});
@@ -87,9 +88,9 @@ TEST(CellConvert, NamesTheMemoryThatManySmallBlocksTake) {
   // Nothing of it is read: a thousand layers of a million cells.
   const FunctionGridSource nodes(std::vector(1'000, gridBlock(3000, 300, 2)), 0,
                                  [](const GridNode&) { return NodeValues{}; });
-  const CellGridSource source(nodes, {field});
+  const CellGridSource source(nodes, {cellField});
   const TemporaryFolder folder;
-  ConvertOptions options = optionsFor(folder / "c.splats", {0});
+  ConvertOptions options = cellOptionsFor(folder / "c.splats", {0});
   const std::string error = errorOf([&] { converted(source, options); });
   expectSays(error, "matching the faces of this grid's blocks takes 215 MiB; give at least ");
   // Matching has a sixteenth of what the allocator's sixteenth and the program itself (some 82 MiB) leave.
@@ -111,7 +112,7 @@ TEST(CellConvert, LeavesOutCellsWithoutACornerOrAValue) {
                                 if (cell.i == 1) return std::numeric_limits<double>::infinity();
                                 return cell.i == 2 ? -99.0 : x;
                               }});
-  ConvertOptions options = optionsFor(folder / "c.splats", {0});
+  ConvertOptions options = cellOptionsFor(folder / "c.splats", {0});
   options.blank_value = -99;
   const ConvertReport report = converted(source, options);
   EXPECT_EQ(report.nodes, 512u + 8);
@@ -130,7 +131,7 @@ TEST(CellConvert, RefusesNodesAndCellsInOneCache) {
   const TemporaryFolder folder;
   const CellScene scene;
   const std::string error = errorOf([&] {
-    converted(scene.source, optionsFor(folder / "c.splats", {0, 1}));
+    converted(scene.source, cellOptionsFor(folder / "c.splats", {0, 1}));
   });
   expectSays(error, "f is node-centred, but c0 is cell-centred");
   EXPECT_FALSE(std::filesystem::exists(folder / "c.splats"));
@@ -139,8 +140,8 @@ TEST(CellConvert, RefusesNodesAndCellsInOneCache) {
 TEST(CellConvert, AddsAScalarAsIfItHadBeenThereFromTheStart) {
   const TemporaryFolder folder;
   const CellScene scene;
-  converted(scene.source, optionsFor(folder / "both.splats", {1, 2}));
-  converted(scene.source, optionsFor(folder / "one.splats", {1}));
+  converted(scene.source, cellOptionsFor(folder / "both.splats", {1, 2}));
+  converted(scene.source, cellOptionsFor(folder / "one.splats", {1}));
   const AddScalarReport report = addQuietly(scene.source, folder / "one.splats", 2);
   EXPECT_EQ(report.splats, 32u * 39 * 36);
   Files both = allFilesOf(folder / "both.splats"), one = allFilesOf(folder / "one.splats");
@@ -159,18 +160,18 @@ TEST(CellConvert, AddsToTheCellsThatOlderScalarsLeft) {
   const TemporaryFolder folder;
   const SceneGridSource nodes(makeScene("half-annulus"), {33, 40, 37});
   const auto holes = [](const GridCell& cell) {
-    return (cell.i + cell.j + cell.k) % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : field(cell);
+    return (cell.i + cell.j + cell.k) % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : cellField(cell);
   };
-  const CellGridSource source(nodes, {holes, field});
-  converted(source, optionsFor(folder / "both.splats", {1, 2}));
-  converted(source, optionsFor(folder / "one.splats", {1}));
+  const CellGridSource source(nodes, {holes, cellField});
+  converted(source, cellOptionsFor(folder / "both.splats", {1, 2}));
+  converted(source, cellOptionsFor(folder / "one.splats", {1}));
   addQuietly(source, folder / "one.splats", 2);
   Files both = allFilesOf(folder / "both.splats"), one = allFilesOf(folder / "one.splats");
   EXPECT_TRUE(both["var.1.bin"] == one["var.1.bin"]);
   EXPECT_TRUE(both["geometry.bin"] == one["geometry.bin"]);
 
   // The other way round a value is missing.
-  converted(source, optionsFor(folder / "whole.splats", {2}));
+  converted(source, cellOptionsFor(folder / "whole.splats", {2}));
   expectSays(errorOf([&] { addQuietly(source, folder / "whole.splats", 1); }), "convert again");
 }
 

@@ -57,12 +57,12 @@ struct CellBlock : MappedBlock {
   }
 };
 
-glm::dvec3 halfAnnulus(double u, double v, double w) {
+glm::dvec3 annulusPoint(double u, double v, double w) {
   const double theta = M_PI * u, r = 0.3 + 0.7 * std::expm1(2.5 * v) / std::expm1(2.5);
   return {-r * std::sin(theta), r * std::cos(theta), w + 0.15 * r * std::sin(3 * theta)};
 }
 
-const NodeSplat* splatOf(const NodeSplats& splats, uint64_t node) {
+const NodeSplat* splatAtNode(const NodeSplats& splats, uint64_t node) {
   for (const NodeSplat& splat : splats.splats)
     if (splat.node == node) return &splat;
   return nullptr;
@@ -115,7 +115,7 @@ TEST(CellSplats, OfAnAffineGridAreItsCells) {
     EXPECT_EQ(out.degenerate, 0u);
     // One at the block's end is a whole cell as well.
     for (const uint64_t i : {1u, 3u}) {
-      const NodeSplat* cell = splatOf(out, grid.at(i, 2, 4));
+      const NodeSplat* cell = splatAtNode(out, grid.at(i, 2, 4));
       ASSERT_NE(cell, nullptr);
       EXPECT_TRUE(cell->regular);
       EXPECT_FALSE(cell->on_block_face);
@@ -182,7 +182,7 @@ TEST(CellSplats, OfOneLayerEndAtBothOfItsFaces) {
   ASSERT_EQ(out.splats.size(), 2u * 4 * 3);
   EXPECT_NEAR(totalWeight(out) / (12 * glm::determinant(jacobian)), 1, 1e-9);
   for (const uint64_t half : {0u, 1u}) {
-    const NodeSplat* splat = splatOf(out, grid.at(1, 1, half));
+    const NodeSplat* splat = splatAtNode(out, grid.at(1, 1, half));
     ASSERT_NE(splat, nullptr);
     EXPECT_LT(glm::distance(splat->splat.position, jacobian * glm::dvec3(1.5, 1.5, half == 0 ? 0.25 : 0.75)),
               1e-12);
@@ -201,7 +201,7 @@ TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> off(-0.2, 0.2);
   CellBlock grid(6, 7, 5, [&](double i, double j, double k) {
-    return halfAnnulus(i / 5, j / 6, k / 4) + 0.05 * glm::dvec3(off(random), off(random), off(random));
+    return annulusPoint(i / 5, j / 6, k / 4) + 0.05 * glm::dvec3(off(random), off(random), off(random));
   });
   grid.addCellScalar([](const glm::dvec3&) { return 1; });
   double volume = 0;
@@ -227,7 +227,7 @@ TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
 TEST(CellSplats, OfALinearFieldCarryItExactly) {
   // On any grid, at its ends and beside blanked cells: the slope is Aᵀ∇f, whatever the neighbours' distances.
   const glm::dvec3 gradient(0.5, -2, 0.25);
-  CellBlock grid(12, 7, 9, [](double i, double j, double k) { return halfAnnulus(i / 11, j / 6, k / 8); });
+  CellBlock grid(12, 7, 9, [](double i, double j, double k) { return annulusPoint(i / 11, j / 6, k / 8); });
   grid.addCellScalar([](const glm::dvec3& p) { return p.x; });
   grid.addCellScalar([&](const glm::dvec3& p) { return 1.5 + glm::dot(gradient, p); });
   grid.nodes.scalars[1][grid.at(4, 3, 3)] = NAN;
@@ -254,16 +254,16 @@ TEST(CellSplats, AreNotThereWithoutACornerOrAValue) {
   ASSERT_EQ(out.splats.size(), 216u - 8 - 1);
   EXPECT_TRUE(allFinite(out));
   EXPECT_NEAR(totalWeight(out), 207, 1e-12);
-  for (const uint64_t i : {2u, 3u}) EXPECT_EQ(splatOf(out, grid.at(i, 2, 3)), nullptr);
-  EXPECT_EQ(splatOf(out, grid.at(0, 0, 5)), nullptr);
+  for (const uint64_t i : {2u, 3u}) EXPECT_EQ(splatAtNode(out, grid.at(i, 2, 3)), nullptr);
+  EXPECT_EQ(splatAtNode(out, grid.at(0, 0, 5)), nullptr);
   // Its neighbour after is gone: (1.5² - 0.5²) / 1.
-  const NodeSplat* beside = splatOf(out, grid.at(1, 2, 3));
+  const NodeSplat* beside = splatAtNode(out, grid.at(1, 2, 3));
   ASSERT_NE(beside, nullptr);
   EXPECT_NEAR(out.values[static_cast<size_t>(beside - out.splats.data())].slope.x, 2, 1e-6);
 }
 
 TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
-  CellBlock grid(6, 8, 9, [](double i, double j, double k) { return halfAnnulus(i / 5, j / 7, k / 8); });
+  CellBlock grid(6, 8, 9, [](double i, double j, double k) { return annulusPoint(i / 5, j / 7, k / 8); });
   grid.addCellScalar([](const glm::dvec3& p) { return p.x * p.y + p.z; });
   grid.nodes.blank[grid.at(2, 4, 4)] = kNoNode;
   const TemporaryFolder folder;
@@ -313,7 +313,7 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
 
 TEST(CellSplats, OfPartsOfRowsAreThoseOfTheWhole) {
   CellBlock grid(18, 5, 6, [](double i, double j, double k) {
-    return halfAnnulus((i + 0.2 * std::sin(2 * i)) / 17, j / 4, k / 5);
+    return annulusPoint((i + 0.2 * std::sin(2 * i)) / 17, j / 4, k / 5);
   });
   grid.addCellScalar([](const glm::dvec3& p) { return p.x * p.y + p.z; });
   grid.nodes.blank[grid.at(9, 2, 3)] = kNoNode;
@@ -364,7 +364,7 @@ TEST(CellSplats, OfUnevenCellsAreStretchedByTheirNeighbours) {
     for (size_t n = 0; n < 6; ++n) {
       std::array<uint64_t, 3> cell{1, 1, 1};
       cell[axis] = n;
-      const NodeSplat* splat = splatOf(out, grid.at(cell[0], cell[1], cell[2]));
+      const NodeSplat* splat = splatAtNode(out, grid.at(cell[0], cell[1], cell[2]));
       ASSERT_TRUE(splat);
       // Extents 1, 1.6, 1, 1, 1.6, 1; those beyond the ends are mirrored.
       const auto extent = [&](size_t m) { return (m + 6) % 3 == 1 ? 1.6 : 1.0; };

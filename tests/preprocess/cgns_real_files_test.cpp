@@ -17,7 +17,7 @@
 namespace curvisplat {
 namespace {
 
-const std::filesystem::path kShared = CURVISPLAT_SHARED_DATA;
+const std::filesystem::path kRealFiles = CURVISPLAT_SHARED_DATA;
 
 /// The checksum of zlib: polynomial 0x04c11db7, reflected.
 class Crc32 {
@@ -63,12 +63,12 @@ void expectFound(const Found& found, const ExpectedArray& expected) {
 class RealCgns : public testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::is_directory(kShared)) GTEST_SKIP() << "needs " << kShared;
+    if (!std::filesystem::is_directory(kRealFiles)) GTEST_SKIP() << "needs " << kRealFiles;
   }
 
   static std::unique_ptr<GridSource> open(const char* file) {
     OpenGridOptions options;
-    options.grid = kShared / file;
+    options.grid = kRealFiles / file;
     return openGrid(options);
   }
 

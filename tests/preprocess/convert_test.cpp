@@ -78,7 +78,7 @@ void checkCache(const std::filesystem::path& path, uint64_t splats) {
 }
 
 /// A box of nodes with rounded edges: smooth, and not aligned to anything.
-NodeValues bentBox(const GridNode& node, const GridBlock& block, double stretch = 1) {
+NodeValues roundedBox(const GridNode& node, const GridBlock& block, double stretch = 1) {
   const double u = static_cast<double>(node.i) / static_cast<double>(std::max<uint64_t>(block.ni - 1, 1));
   const double v = static_cast<double>(node.j) / static_cast<double>(std::max<uint64_t>(block.nj - 1, 1));
   const double w = static_cast<double>(node.k) / static_cast<double>(std::max<uint64_t>(block.nk - 1, 1));
@@ -86,10 +86,10 @@ NodeValues bentBox(const GridNode& node, const GridBlock& block, double stretch 
   return {position, {static_cast<float>(u * v), static_cast<float>(w)}, false};
 }
 
-FunctionGridSource bentBoxSource(uint64_t ni, uint64_t nj, uint64_t nk, size_t scalars = 1,
-                                 double stretch = 1) {
+FunctionGridSource roundedBoxSource(uint64_t ni, uint64_t nj, uint64_t nk, size_t scalars = 1,
+                                    double stretch = 1) {
   const GridBlock block = gridBlock(ni, nj, nk);
-  return {{block}, scalars, [=](const GridNode& node) { return bentBox(node, block, stretch); }};
+  return {{block}, scalars, [=](const GridNode& node) { return roundedBox(node, block, stretch); }};
 }
 
 TEST(Convert, KeepsEveryNodeAndItsVolume) {
@@ -130,7 +130,7 @@ TEST(Convert, DividesBucketsThatThePlanLeftTooLarge) {
   const TemporaryFolder folder;
   const GridBlock block = gridBlock(44, 44, 44);
   const FunctionGridSource source({block}, 1, [&](const GridNode& node) {
-    NodeValues values = bentBox(node, block);
+    NodeValues values = roundedBox(node, block);
     if (node.k > 15) values.position = glm::dvec3(0.3) + 1e-6 * values.position;
     return values;
   });
@@ -156,7 +156,7 @@ TEST(Convert, TakesAClusterOfCoincidentNodesInAGrid) {
   const TemporaryFolder folder;
   const GridBlock block = gridBlock(50, 44, 44);
   const FunctionGridSource source({block}, 1, [&](const GridNode& node) {
-    NodeValues values = bentBox(node, block);
+    NodeValues values = roundedBox(node, block);
     if (node.k >= 5 && node.k < 40) values.position = glm::dvec3(0.5);
     return values;
   });
@@ -170,7 +170,7 @@ TEST(Convert, TakesBlocksOneNodeThick) {
   int number = 0;
   for (const auto& [ni, nj, nk] :
        {std::array{300, 1, 1}, {1, 300, 1}, {1, 1, 300}, {40, 40, 1}, {1, 40, 40}, {40, 1, 40}, {1, 1, 1}}) {
-    const FunctionGridSource source = bentBoxSource(ni, nj, nk);
+    const FunctionGridSource source = roundedBoxSource(ni, nj, nk);
     const auto output = folder / fmt::format("{}.splats", number++);
     const ConvertReport report = converted(source, optionsFor(source, output));
     EXPECT_EQ(report.nodes, static_cast<uint64_t>(ni * nj * nk));
@@ -197,7 +197,7 @@ TEST(Convert, TakesManySmallBlocks) {
 
 TEST(Convert, TakesExtremeAspectRatios) {
   const TemporaryFolder folder;
-  const FunctionGridSource source = bentBoxSource(42, 42, 42, 1, 1e-5);
+  const FunctionGridSource source = roundedBoxSource(42, 42, 42, 1, 1e-5);
   const ConvertReport report = converted(source, optionsFor(source, folder / "a.splats"));
   checkCache(folder / "a.splats", 42 * 42 * 42);
   EXPECT_EQ(report.degenerate, 0u);
@@ -208,7 +208,7 @@ TEST(Convert, LeavesBlankedNodesOutAndCountsThem) {
   const TemporaryFolder folder;
   const GridBlock block = gridBlock(30, 20, 10);
   const FunctionGridSource source({block}, 1, [&](const GridNode& node) {
-    NodeValues values = bentBox(node, block);
+    NodeValues values = roundedBox(node, block);
     values.blank = node.i < 3;
     if (node.i == 5) values.scalars[0] = 9999;
     if (node.i == 7) values.position.x = std::numeric_limits<double>::quiet_NaN();
@@ -249,7 +249,7 @@ TEST(Convert, RefusesAGridWithNothingToDraw) {
 
 TEST(Convert, KeepsSeveralScalarsApart) {
   const TemporaryFolder folder;
-  const FunctionGridSource source = bentBoxSource(44, 40, 40, 2);
+  const FunctionGridSource source = roundedBoxSource(44, 40, 40, 2);
   ConvertOptions options = optionsFor(source, folder / "both.splats");
   converted(source, options);
   checkCache(options.output, 44 * 40 * 40);
@@ -263,7 +263,7 @@ TEST(Convert, KeepsSeveralScalarsApart) {
 
 TEST(Convert, RefusesAnOutputThatExists) {
   const TemporaryFolder folder;
-  const FunctionGridSource source = bentBoxSource(10, 10, 10);
+  const FunctionGridSource source = roundedBoxSource(10, 10, 10);
   const ConvertOptions options = optionsFor(source, folder / "a.splats");
   converted(source, options);
   const auto before = allFilesOf(options.output);
@@ -273,7 +273,7 @@ TEST(Convert, RefusesAnOutputThatExists) {
 
 TEST(Convert, RefusesFoldersThatItCannotUse) {
   const TemporaryFolder folder;
-  const FunctionGridSource source = bentBoxSource(10, 10, 10);
+  const FunctionGridSource source = roundedBoxSource(10, 10, 10);
   EXPECT_THROW(converted(source, optionsFor(source, folder / "none/a.splats")), Error);
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.temporary_folder = folder / "none";
@@ -284,11 +284,11 @@ TEST(Convert, RefusesFoldersThatItCannotUse) {
 
 TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   const TemporaryFolder folder;
-  const FunctionGridSource before_source = bentBoxSource(10, 10, 10);
+  const FunctionGridSource before_source = roundedBoxSource(10, 10, 10);
   converted(before_source, optionsFor(before_source, folder / "a.splats"));
   const auto before = allFilesOf(folder / "a.splats");
 
-  const FunctionGridSource source = bentBoxSource(24, 24, 24);
+  const FunctionGridSource source = roundedBoxSource(24, 24, 24);
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.overwrite = true;
   options.limits.bucket_splats = 3000;

@@ -89,7 +89,7 @@ FunctionGridSource tube(uint64_t ni, uint64_t nj, uint64_t nk) {
 }
 
 /// Abutting blocks of unlike cells, that end at one another along i and along j, one apart; blanked nodes near the cuts.
-FunctionGridSource blocksWithSeams(Centring centring) {
+FunctionGridSource unlikeBlocks(Centring centring) {
   return FunctionGridSource(
       {gridBlock(90, 12, 11), gridBlock(60, 12, 11), gridBlock(90, 6, 11), gridBlock(9, 8, 7)}, 2,
       [](const GridNode& node) {
@@ -118,11 +118,11 @@ TEST_F(CutRows, OfAPeriodicGridGiveTheBytesOfWholeRows) {
 }
 
 TEST_F(CutRows, OfBlocksWithSeamsAndBlanksGiveTheBytesOfWholeRows) {
-  expectSameBytes(blocksWithSeams(Centring::kNode), {1200, 2001, 4000});
+  expectSameBytes(unlikeBlocks(Centring::kNode), {1200, 2001, 4000});
 }
 
 TEST_F(CutRows, OfCellsGiveTheBytesOfWholeRows) {
-  expectSameBytes(blocksWithSeams(Centring::kCell), {1200, 2001});
+  expectSameBytes(unlikeBlocks(Centring::kCell), {1200, 2001});
 }
 
 TEST_F(CutRows, OfOverlappingBlocksGiveTheBytesOfWholeRows) {
@@ -134,7 +134,7 @@ TEST_F(CutRows, OfOverlappingBlocksGiveTheBytesOfWholeRows) {
 
 TEST_F(CutRows, AreSharedByRanks) {
   for (const Centring centring : {Centring::kNode, Centring::kCell}) {
-    const FunctionGridSource source = blocksWithSeams(centring);
+    const FunctionGridSource source = unlikeBlocks(centring);
     const uint64_t slab_bytes = bytesFor(1500, 2);
     for (const unsigned ranks : {5u, 2u})
       if (ranks == 5 || faults::isWholeSweep())
@@ -147,7 +147,7 @@ TEST_F(CutRows, TakeAFurtherScalarAsWholeOnesDo) {
   for (const Centring centring : {Centring::kNode, Centring::kCell})
     for (const bool blanks : {false, true}) {  // of the older scalar, which the cache alone knows
       if (blanks != (centring == Centring::kNode) && !faults::isWholeSweep()) continue;
-      const FunctionGridSource source = blocksWithSeams(centring);
+      const FunctionGridSource source = unlikeBlocks(centring);
       ConvertOptions options = optionsFor("first.splats", source);
       options.scalars = {0};
       if (blanks) options.blank_value = kMissing;
@@ -161,7 +161,7 @@ TEST_F(CutRows, TakeAFurtherScalarAsWholeOnesDo) {
 }
 
 TEST_F(CutRows, OfAStepAreRecognisedAsTheSameGeometry) {
-  const FunctionGridSource source = blocksWithSeams(Centring::kNode);
+  const FunctionGridSource source = unlikeBlocks(Centring::kNode);
   ConvertOptions options = optionsFor("steps.splats", source);
   options.surfaces = false;
   options.planes = {};
@@ -179,7 +179,7 @@ TEST_F(CutRows, OfAStepAreRecognisedAsTheSameGeometry) {
 }
 
 TEST_F(CutRows, HaveTheChecksumOfWholeRows) {
-  const FunctionGridSource source = blocksWithSeams(Centring::kNode);
+  const FunctionGridSource source = unlikeBlocks(Centring::kNode);
   const NodeReader reader(source, {0}, std::nullopt);
   const auto checksum = [&](uint64_t window, Halo halo) {
     GridChecksum sum;
@@ -206,8 +206,8 @@ TEST_F(CutRows, HaveTheChecksumOfWholeRows) {
 }
 
 TEST_F(CutRows, AreTakenFromWholeOnesByDefault) {
-  expectPartsOfRows(blocksWithSeams(Centring::kNode));
-  expectPartsOfRows(blocksWithSeams(Centring::kCell));
+  expectPartsOfRows(unlikeBlocks(Centring::kNode));
+  expectPartsOfRows(unlikeBlocks(Centring::kCell));
 }
 
 TEST_F(CutRows, OfASourceThatReadsWholeOnesAreRefusedWithASufficientSize) {

@@ -56,13 +56,13 @@ class FlowMesh final : public MeshSource {
   GridDescription description_;
 };
 
-std::optional<uint32_t> scalarOf(const GridDescription& description, const std::string& name) {
+std::optional<uint32_t> scalarNumber(const GridDescription& description, const std::string& name) {
   for (uint32_t n = 0; n < description.scalars.size(); ++n)
     if (description.scalars[n].name == name) return n;
   return std::nullopt;
 }
 
-DerivedMeshSource conserved(Centring centring, const DerivedOptions& options = {}) {
+DerivedMeshSource conservedMesh(Centring centring, const DerivedOptions& options = {}) {
   return DerivedMeshSource(
       std::make_unique<FlowMesh>(
           std::vector<std::string>{"Density", "Momentum_x", "Momentum_y", "Momentum_z", "Energy"},
@@ -71,13 +71,13 @@ DerivedMeshSource conserved(Centring centring, const DerivedOptions& options = {
 }
 
 TEST(DerivedMesh, QuantitiesOfTheConservedOnes) {
-  const DerivedMeshSource mesh = conserved(Centring::kNode);
+  const DerivedMeshSource mesh = conservedMesh(Centring::kNode);
   // (gamma - 1)(E - rho v²/2): 0.4 (20 - 12.5) and 0.4 (9 - 4.5).
   const double p[] = {3.0, 1.8}, rho[] = {1, 2}, speed2[] = {25, 4.5};
   std::vector<uint32_t> wanted;
   for (const char* const name : {"pressure", "mach_number", "Energy", "velocity_magnitude", "temperature"}) {
-    ASSERT_TRUE(scalarOf(mesh.description(), name)) << name;
-    wanted.push_back(*scalarOf(mesh.description(), name));
+    ASSERT_TRUE(scalarNumber(mesh.description(), name)) << name;
+    wanted.push_back(*scalarNumber(mesh.description(), name));
   }
   MeshPoints points;
   mesh.readPoints(0, 0, 2, wanted, points);
@@ -95,8 +95,8 @@ TEST(DerivedMesh, CellsRangesGasAndBlankValues) {
   DerivedOptions options;
   options.gas.gamma = 2;
   options.blank_value = 20;
-  const DerivedMeshSource mesh = conserved(Centring::kCell, options);
-  const uint32_t pressure = *scalarOf(mesh.description(), "pressure");
+  const DerivedMeshSource mesh = conservedMesh(Centring::kCell, options);
+  const uint32_t pressure = *scalarNumber(mesh.description(), "pressure");
   EXPECT_EQ(mesh.description().scalars[pressure].centring, Centring::kCell);
   MeshCells cells;
   mesh.readCells(0, 1, 1, std::span(&pressure, 1), cells);
@@ -104,7 +104,7 @@ TEST(DerivedMesh, CellsRangesGasAndBlankValues) {
   mesh.readCells(0, 0, 1, std::span(&pressure, 1), cells);
   EXPECT_TRUE(std::isnan(cells.scalars.at(0).at(0)));  // its energy is the value of blanked samples
   options.gas.gamma = 0.5;
-  EXPECT_THROW(conserved(Centring::kCell, options), UsageError);
+  EXPECT_THROW(conservedMesh(Centring::kCell, options), UsageError);
 }
 
 TEST(DerivedMesh, WarnsOfAGaugePressure) {
@@ -115,9 +115,9 @@ TEST(DerivedMesh, WarnsOfAGaugePressure) {
             std::vector<std::vector<float>>{{1, 1}, {least, 5}, {1, 1}, {0, 0}, {0, 0}}, Centring::kNode),
         {});
     const std::vector<ScalarRange> ranges(3, {0, 1});
-    const uint32_t wanted[] = {*scalarOf(mesh.description(), "mach_number"),
-                               *scalarOf(mesh.description(), "velocity_magnitude"),
-                               *scalarOf(mesh.description(), "entropy")};
+    const uint32_t wanted[] = {*scalarNumber(mesh.description(), "mach_number"),
+                               *scalarNumber(mesh.description(), "velocity_magnitude"),
+                               *scalarNumber(mesh.description(), "entropy")};
     const std::vector<std::string> warnings = warningsOfRanges(mesh, wanted, ranges);
     ASSERT_EQ(warnings.size(), least < 0 ? 1u : 0u);
     if (least > 0) continue;
@@ -136,10 +136,10 @@ TEST(DerivedMesh, WhatIsStoredOrNeedsGradientsIsNotOffered) {
   EXPECT_EQ(std::count_if(scalars.begin(), scalars.end(),
                           [](const GridScalar& s) { return s.name == "pressure" || s.name == "Pressure"; }),
             1);
-  EXPECT_TRUE(scalarOf(mesh.description(), "entropy"));
+  EXPECT_TRUE(scalarNumber(mesh.description(), "entropy"));
   for (const char* const name :
        {"i", "volume", "jacobian", "mach_number", "q_criterion", "pressure_coefficient"})
-    EXPECT_FALSE(scalarOf(mesh.description(), name)) << name;
+    EXPECT_FALSE(scalarNumber(mesh.description(), name)) << name;
 }
 
 }  // namespace

@@ -51,14 +51,14 @@ class NamedGrid : public FunctionGridSource {
 
 const std::vector<std::string> kConserved{"density", "momentum_x", "momentum_y", "momentum_z", "energy"};
 
-std::vector<float> conserved(const Flow& f) {
+std::vector<float> conservedVariables(const Flow& f) {
   const double speed2 = f.v[0] * f.v[0] + f.v[1] * f.v[1] + f.v[2] * f.v[2];
   return {static_cast<float>(f.rho), static_cast<float>(f.rho * f.v[0]), static_cast<float>(f.rho * f.v[1]),
           static_cast<float>(f.rho * f.v[2]), static_cast<float>(f.p / (kGamma - 1) + f.rho * speed2 / 2)};
 }
 
 /// Bent and uneven; left-handed.
-glm::dvec3 bent(const GridNode& node, uint64_t ni, uint64_t nj, uint64_t nk) {
+glm::dvec3 bentPosition(const GridNode& node, uint64_t ni, uint64_t nj, uint64_t nk) {
   const double u = static_cast<double>(node.i) / static_cast<double>(ni - 1),
                v = static_cast<double>(node.j) / static_cast<double>(nj - 1),
                w = static_cast<double>(node.k) / static_cast<double>(nk - 1);
@@ -71,8 +71,8 @@ std::unique_ptr<GridSource> bentFlow(uint64_t n, const std::function<Flow(const 
   return std::make_unique<NamedGrid>(
       std::vector{gridBlock(n, n + 2, n + 1)}, kConserved,
       [=](const GridNode& node) {
-        const glm::dvec3 x = bent(node, n, n + 2, n + 1);
-        return NodeValues{x, conserved(flow(x)), false};
+        const glm::dvec3 x = bentPosition(node, n, n + 2, n + 1);
+        return NodeValues{x, conservedVariables(flow(x)), false};
       },
       mach);
 }
@@ -214,7 +214,7 @@ TEST(DerivedSource, LeavesOutWhatIsBlankOrHasNoFlow) {
   auto source =
       std::make_unique<NamedGrid>(std::vector{gridBlock(7, 6, 5)}, kConserved, [=](const GridNode& node) {
         const glm::dvec3 x(node.i, node.j, node.k);
-        NodeValues values{x, conserved(flow(x)), false};
+        NodeValues values{x, conservedVariables(flow(x)), false};
         if (node.i == 3 && node.j == 3 && node.k == 2) {
           values.blank = true;
           values.scalars = {0, 1e30f, 1, 1, -1e30f};
@@ -393,7 +393,7 @@ TEST(DerivedSource, TakesCgnsNamesAndStoredPressure) {
 
 TEST(DerivedSource, OfCellsStandInCells) {
   const FunctionGridSource nodes({gridBlock(8, 8, 8)}, 0, [](const GridNode& node) {
-    return NodeValues{bent(node, 8, 8, 8), {}, node.i == 4 && node.j == 4 && node.k == 4};
+    return NodeValues{bentPosition(node, 8, 8, 8), {}, node.i == 4 && node.j == 4 && node.k == 4};
   });
   class Renamed : public CellGridSource {
    public:
@@ -428,7 +428,7 @@ TEST(DerivedSource, OfCellsStandInCells) {
   EXPECT_EQ(cells_there, 7 * 7 * 7 - 8);
   expectPartsOfRows(source);
   // Coordinates are still those of the nodes.
-  EXPECT_EQ(out.x[3], bent({0, 3, 0, 0}, 8, 8, 8).x);
+  EXPECT_EQ(out.x[3], bentPosition({0, 3, 0, 0}, 8, 8, 8).x);
 }
 
 TEST(DerivedSource, AFileVariablesNumberComesFirst) {

@@ -23,7 +23,7 @@
 namespace curvisplat {
 namespace {
 
-NodeValues bent(const GridNode& node) {
+NodeValues bentNode(const GridNode& node) {
   const glm::dvec3 at(node.i, node.j, node.k);
   return {{at.x + 0.1 * std::sin(at.y), at.y * 0.5, at.z + 0.02 * at.x * at.y},
           {static_cast<float>(at.x + 100 * at.y), static_cast<float>(at.z)},
@@ -31,11 +31,11 @@ NodeValues bent(const GridNode& node) {
 }
 
 /// Two blocks that abut at the i end of the first.
-FunctionGridSource twoBlocks(uint64_t ni, uint64_t nj, uint64_t nk) {
+FunctionGridSource blocksInARow(uint64_t ni, uint64_t nj, uint64_t nk) {
   return {{gridBlock(ni, nj, nk), gridBlock(ni, nj, nk)}, 2, [=](const GridNode& node) {
             GridNode moved = node;
             moved.i += node.block * (ni - 1);
-            return bent(moved);
+            return bentNode(moved);
           }};
 }
 
@@ -76,7 +76,7 @@ uint64_t quadsOf(const FacesReader& faces, const GridFace& face) {
 }
 
 TEST_F(GridFacesTest, AFaceClosedByAnotherBlockIsNotAnOuterFace) {
-  const auto faces = convertAndOpen(twoBlocks(6, 5, 4));
+  const auto faces = convertAndOpen(blocksInARow(6, 5, 4));
   ASSERT_TRUE(faces);
   std::map<std::pair<uint32_t, std::string>, uint64_t> quads;
   for (const GridFace& face : faces->faces())
@@ -92,7 +92,7 @@ TEST_F(GridFacesTest, AFaceClosedByAnotherBlockIsNotAnOuterFace) {
 
 TEST_F(GridFacesTest, BlankedNodesLeaveHoles) {
   const auto faces = convertAndOpen(FunctionGridSource({gridBlock(6, 5, 4)}, 2, [](const GridNode& node) {
-    NodeValues values = bent(node);
+    NodeValues values = bentNode(node);
     values.blank = node.k == 0 && node.i == 2 && node.j == 2;
     return values;
   }));
@@ -126,7 +126,7 @@ QuadSums blankQuadsOf(const FacesReader& blanks) {
 }
 
 NodeValues straight(const GridNode& node) {
-  NodeValues values = bent(node);
+  NodeValues values = bentNode(node);
   values.position = {node.i, node.j, node.k};
   return values;
 }
@@ -214,12 +214,12 @@ TEST_F(GridFacesTest, FacesOfBlankedCellsAreFoundWhereBlocksMeet) {
 }
 
 TEST_F(GridFacesTest, AGridWithoutBlankedNodesHasNoFacesOfThem) {
-  ASSERT_TRUE(convertAndOpen(twoBlocks(6, 5, 4)));
+  ASSERT_TRUE(convertAndOpen(blocksInARow(6, 5, 4)));
   EXPECT_FALSE(FacesReader::open(folder_ / "a.splats", manifest_, kBlanksFileName));
 }
 
 TEST_F(GridFacesTest, APlaneInsideIsKeptWhenAskedFor) {
-  const auto faces = convertAndOpen(twoBlocks(6, 5, 4), {{1, 2, 2}});
+  const auto faces = convertAndOpen(blocksInARow(6, 5, 4), {{1, 2, 2}});
   int found = 0;
   for (const GridFace& face : faces->faces())
     if (face.side == FaceSide::kPlane) {
@@ -229,8 +229,8 @@ TEST_F(GridFacesTest, APlaneInsideIsKeptWhenAskedFor) {
       EXPECT_EQ(quadsOf(*faces, face), 5u * 4);
     }
   EXPECT_EQ(found, 1);
-  EXPECT_THROW(convertAndOpen(twoBlocks(6, 5, 4), {{1, 2, 4}}), Error);
-  EXPECT_THROW(convertAndOpen(twoBlocks(6, 5, 4), {{2, 2, 0}}), Error);
+  EXPECT_THROW(convertAndOpen(blocksInARow(6, 5, 4), {{1, 2, 4}}), Error);
+  EXPECT_THROW(convertAndOpen(blocksInARow(6, 5, 4), {{2, 2, 0}}), Error);
 }
 
 /// A wing without thickness: the side k = 0 is folded onto itself.
@@ -252,7 +252,7 @@ TEST_F(GridFacesTest, ASideThatFoldsIsKeptAsAPlane) {
 /// so has every coarser level.
 TEST_F(GridFacesTest, EveryLevelHasTheGridsNodes) {
   constexpr uint64_t kI = 200, kJ = 90;
-  const auto faces = convertAndOpen(FunctionGridSource({gridBlock(kI, kJ, 2)}, 2, bent));
+  const auto faces = convertAndOpen(FunctionGridSource({gridBlock(kI, kJ, 2)}, 2, bentNode));
   const double tolerance = 1e-6;
   std::map<std::array<uint32_t, 2>, uint64_t> quads;  // by stride, in finest quads
   for (uint32_t n = 0; n < faces->patches().size(); ++n) {
@@ -266,7 +266,7 @@ TEST_F(GridFacesTest, EveryLevelHasTheGridsNodes) {
     for (uint64_t v = 0; v < patch.nodes[1]; ++v)
       for (uint64_t u = 0; u < patch.nodes[0]; ++u) {
         const GridNode node{0, latticeIndex(face, patch, 0, u), latticeIndex(face, patch, 1, v), 0};
-        const NodeValues truth = bent(node);
+        const NodeValues truth = bentNode(node);
         const size_t at = v * patch.nodes[0] + u;
         ASSERT_LT(glm::distance(nodes.positions[at], truth.position), 200 * tolerance);
         ASSERT_NEAR(nodes.scalars[0][at], truth.scalars[0], 0.2);
@@ -282,7 +282,7 @@ TEST_F(GridFacesTest, EveryLevelHasTheGridsNodes) {
 }
 
 TEST_F(GridFacesTest, BytesDependOnTheGridAlone) {
-  const FunctionGridSource source = twoBlocks(80, 70, 40);
+  const FunctionGridSource source = blocksInARow(80, 70, 40);
   convertAndOpen(source);
   const std::string once = bytes();
   threads_ = 1;
@@ -332,7 +332,7 @@ TEST_F(GridFacesTest, QuadsOfVeryManyBoundariesAreDrawn) {
       boundaries.push_back({std::to_string(boundaries.size()), "BCWall", 1, {0, j, k}, {0, j + 1, k + 1}});
   boundaries.push_back({"whole", "BCWall", 0, {0, 0, 0}, {0, kSide, kSide}});
   boundaries.push_back({"inside", "BCWall", 0, {1, 0, 0}, {1, kSide, kSide}});
-  const FunctionGridSource grid = twoBlocks(3, kSide + 1, kSide + 1);
+  const FunctionGridSource grid = blocksInARow(3, kSide + 1, kSide + 1);
   const auto faces = convertAndOpen(BoundedGrid(grid, boundaries));
   ASSERT_TRUE(faces);
   std::map<std::pair<uint32_t, FaceSide>, uint64_t> quads;
@@ -354,7 +354,7 @@ TEST_F(GridFacesTest, QuadsOfVeryManyBoundariesAreDrawn) {
 }
 
 TEST_F(GridFacesTest, ADamagedFileIsRefused) {
-  convertAndOpen(twoBlocks(20, 30, 10));
+  convertAndOpen(blocksInARow(20, 30, 10));
   const std::string whole = bytes();
   const auto path = folder_ / "a.splats/faces.bin";
   const auto outcome = [&](const std::string& text) {

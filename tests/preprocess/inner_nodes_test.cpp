@@ -60,7 +60,7 @@ NodeSplats oneByOne(BlockWindow window) {
   return splatsOf(window);
 }
 
-MappedBlock unevenBlock(uint64_t ni, double handedness, double jitter) {
+MappedBlock jitteredBlock(uint64_t ni, double handedness, double jitter) {
   std::mt19937_64 random(ni);
   std::normal_distribution<double> normal(0, 1);
   MappedBlock grid(ni, 7, 8, [&](double i, double j, double k) {
@@ -78,7 +78,7 @@ TEST(InnerNodes, HaveTheBitsOfOneAfterTheOther) {
     hwy::SetSupportedTargetsForTest(target);
     for (const uint64_t ni : {4u, 11u, 12u, 13u, 19u, 20u, 21u, 40u}) {
       for (const double handedness : {1.0, -1.0}) {
-        const MappedBlock grid = unevenBlock(ni, handedness, 0.05);
+        const MappedBlock grid = jitteredBlock(ni, handedness, 0.05);
         EXPECT_TRUE(sameSplats(splatsOf(grid.window()), oneByOne(grid.window())))
             << hwy::TargetName(target) << ", " << ni << " nodes";
       }
@@ -89,7 +89,7 @@ TEST(InnerNodes, HaveTheBitsOfOneAfterTheOther) {
 
 TEST(InnerNodes, ThatHaveCollapsedAreComputedOneByOne) {
   // Some are flat, in the rest of a row too; some coincide with all their neighbours.
-  MappedBlock grid = unevenBlock(27, 1, 0);
+  MappedBlock grid = jitteredBlock(27, 1, 0);
   for (const uint64_t i : {5u, 9u, 20u, 23u}) {
     for (const ptrdiff_t axis_stride : {ptrdiff_t{1}, ptrdiff_t{27}}) {
       const size_t at = grid.at(i, 3, 4);
@@ -109,7 +109,7 @@ TEST(InnerNodes, ThatHaveCollapsedAreComputedOneByOne) {
 }
 
 TEST(InnerNodes, OfPartsOfRowsAndBesideBlanksAreTheSame) {
-  MappedBlock grid = unevenBlock(61, 1, 0.02);
+  MappedBlock grid = jitteredBlock(61, 1, 0.02);
   grid.nodes.blank[grid.at(30, 2, 3)] = 1;
   for (const auto& [i0, i1] : {std::pair<uint64_t, uint64_t>{0, 30}, {1, 61}, {2, 10}, {17, 26}, {44, 60}}) {
     BlockWindow window = grid.window();
@@ -122,7 +122,7 @@ TEST(InnerNodes, OfPartsOfRowsAndBesideBlanksAreTheSame) {
 TEST(InnerNodes, BetweenBlanksAreTheSame) {
   std::mt19937_64 random(5);
   for (const uint64_t blanks : {1u, 3u, 20u, 200u}) {
-    MappedBlock grid = unevenBlock(90, 1, 0.02);
+    MappedBlock grid = jitteredBlock(90, 1, 0.02);
     for (uint64_t n = 0; n < blanks; ++n) grid.nodes.blank[random() % grid.nodes.blank.size()] = 1;
     EXPECT_TRUE(sameSplats(splatsOf(grid.window()), oneByOne(grid.window()))) << blanks << " blanks";
   }
@@ -130,7 +130,7 @@ TEST(InnerNodes, BetweenBlanksAreTheSame) {
 
 TEST(InnerNodes, FarFromBlanksDoNotKnowOfThem) {
   constexpr uint64_t kNi = 60, kBlank = 31, kReach = kStretchReach + 1;
-  MappedBlock grid = unevenBlock(kNi, 1, 0.02);
+  MappedBlock grid = jitteredBlock(kNi, 1, 0.02);
   const NodeSplats without = splatsOf(grid.window());
   for (uint64_t k = 0; k < 8; ++k)
     for (uint64_t j = 0; j < 7; ++j) grid.nodes.blank[grid.at(kBlank, j, k)] = 1;

@@ -16,12 +16,12 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kSteps = 24;  // of a logarithm to the base of 2
+constexpr double kStepsPerOctave = 24;  // of a logarithm to the base of 2
 
 /// The length as it is kept.
 double kept(double length, double unit) {
-  const double steps = std::clamp(std::round(kSteps * std::log2(length / unit)), -127.0, 127.0);
-  return unit * std::exp2(steps / kSteps);
+  const double steps = std::clamp(std::round(kStepsPerOctave * std::log2(length / unit)), -127.0, 127.0);
+  return unit * std::exp2(steps / kStepsPerOctave);
 }
 
 void expectKept(const CellRow& row, float unit) {
@@ -52,7 +52,7 @@ TEST(JointLine, RoundsBesideTheMiddleBetweenTwoSteps) {
   for (int steps = -130; steps <= 130; ++steps)
     for (const double beside : {-1e-3, -1e-6, -1e-9, 1e-9, 1e-6, 1e-3}) {
       CellRow row;
-      row.fill(3 * std::exp2((steps + 0.5 + beside) / kSteps));
+      row.fill(3 * std::exp2((steps + 0.5 + beside) / kStepsPerOctave));
       expectKept(row, 3);
     }
 }

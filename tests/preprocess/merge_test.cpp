@@ -13,23 +13,23 @@
 namespace curvisplat {
 namespace {
 
-struct Piece {
+struct SplatAndValue {
   Splat splat;
   SplatScalar value;
 };
 
-Piece merged(const std::vector<Piece>& pieces) {
+SplatAndValue merged(const std::vector<SplatAndValue>& pieces) {
   SplatMerger merger(1);
-  for (const Piece& piece : pieces) merger.add(piece.splat.position, piece.splat, {&piece.value, 1});
-  Piece out;
+  for (const SplatAndValue& piece : pieces) merger.add(piece.splat.position, piece.splat, {&piece.value, 1});
+  SplatAndValue out;
   merger.finish(out.splat, {&out.value, 1});
   return out;
 }
 
-std::vector<Piece> randomPieces(std::mt19937_64& random, size_t count, const glm::dvec3& origin) {
+std::vector<SplatAndValue> randomPieces(std::mt19937_64& random, size_t count, const glm::dvec3& origin) {
   std::uniform_real_distribution<double> unit(0, 1), symmetric(-1, 1);
-  std::vector<Piece> pieces(count);
-  for (Piece& piece : pieces) {
+  std::vector<SplatAndValue> pieces(count);
+  for (SplatAndValue& piece : pieces) {
     piece.splat.position = origin + glm::dvec3(symmetric(random), symmetric(random), symmetric(random));
     for (double& axis : piece.splat.axis) axis = std::pow(10, -2 * unit(random));
     for (double& shear : piece.splat.shear) shear = 2 * symmetric(random);
@@ -48,7 +48,7 @@ struct Moments {
   std::array<std::array<long double, 4>, 4> covariance{};
 };
 
-Moments momentsOf(const std::vector<Piece>& pieces) {
+Moments momentsOf(const std::vector<SplatAndValue>& pieces) {
   struct Point {
     double weight;
     std::array<long double, 4> at;
@@ -79,7 +79,7 @@ Moments momentsOf(const std::vector<Piece>& pieces) {
   return moments;
 }
 
-void expectMoments(const Piece& piece, const Moments& expected, double tolerance) {
+void expectMoments(const SplatAndValue& piece, const Moments& expected, double tolerance) {
   const glm::dmat3 a = piece.splat.factor();
   const glm::dmat3 s = a * glm::transpose(a);
   const glm::dvec3 h = a * piece.value.slope;
@@ -134,10 +134,11 @@ TEST(Merge, LosesNoDigitsFarFromTheOrigin) {
   const glm::dvec3 far(1 << 20, -(1 << 20), 1 << 20);
   auto pieces = randomPieces(random, 100, glm::dvec3(0.0));
   // Positions that both places can hold exactly.
-  for (Piece& piece : pieces) piece.splat.position = glm::round(piece.splat.position * 1024.0) / 1024.0;
-  const Piece near = merged(pieces);
-  for (Piece& piece : pieces) piece.splat.position += far;
-  const Piece moved = merged(pieces);
+  for (SplatAndValue& piece : pieces)
+    piece.splat.position = glm::round(piece.splat.position * 1024.0) / 1024.0;
+  const SplatAndValue near = merged(pieces);
+  for (SplatAndValue& piece : pieces) piece.splat.position += far;
+  const SplatAndValue moved = merged(pieces);
   EXPECT_LT(glm::distance(moved.splat.position - far, near.splat.position), 1e-9);
   EXPECT_EQ(moved.splat.axis, near.splat.axis);
   EXPECT_EQ(moved.splat.shear, near.splat.shear);
@@ -147,11 +148,11 @@ TEST(Merge, LosesNoDigitsFarFromTheOrigin) {
 TEST(Merge, OfMergesIsTheMergeOfAll) {
   std::mt19937_64 random(3);
   const auto pieces = randomPieces(random, 64, {0, 0, 0});
-  std::vector<Piece> groups;
+  std::vector<SplatAndValue> groups;
   for (size_t group = 0; group < 8; ++group)
     groups.push_back(merged({pieces.begin() + static_cast<ptrdiff_t>(group * 8),
                              pieces.begin() + static_cast<ptrdiff_t>(group * 8 + 8)}));
-  const Piece all = merged(pieces), twice = merged(groups);
+  const SplatAndValue all = merged(pieces), twice = merged(groups);
   EXPECT_NEAR(all.splat.weight, twice.splat.weight, 1e-9);
   EXPECT_LT(glm::distance(all.splat.position, twice.splat.position), 1e-9);
   for (int n = 0; n < 3; ++n) {
@@ -164,7 +165,7 @@ TEST(Merge, OfMergesIsTheMergeOfAll) {
 }
 
 TEST(Merge, TwoHalfCellsAreTheWholeCell) {
-  std::vector<Piece> halves(2);
+  std::vector<SplatAndValue> halves(2);
   for (int side = 0; side < 2; ++side) {
     const double sign = side == 0 ? -1 : 1;
     halves[side].splat.position = {0.25 * sign, 0, 0};
@@ -172,7 +173,7 @@ TEST(Merge, TwoHalfCellsAreTheWholeCell) {
     halves[side].splat.weight = 0.5;
     halves[side].value = {7 + 0.25 * sign * 2, {1, 0.5, -3}, 0};
   }
-  const Piece whole = merged(halves);
+  const SplatAndValue whole = merged(halves);
   EXPECT_EQ(whole.splat.position, glm::dvec3(0, 0, 0));
   EXPECT_EQ(whole.splat.axis, (std::array{1.0, 1.0, 1.0}));
   EXPECT_EQ(whole.splat.weight, 1);
@@ -184,7 +185,7 @@ TEST(Merge, TwoHalfCellsAreTheWholeCell) {
 TEST(Merge, OfOneGivesItBack) {
   std::mt19937_64 random(4);
   const auto pieces = randomPieces(random, 1, {1e6, 1, 0});
-  const Piece out = merged(pieces);
+  const SplatAndValue out = merged(pieces);
   EXPECT_EQ(out.splat.position, pieces[0].splat.position);
   EXPECT_EQ(out.splat.axis, pieces[0].splat.axis);
   EXPECT_EQ(out.splat.shear, pieces[0].splat.shear);
@@ -197,9 +198,9 @@ TEST(Merge, OfOneGivesItBack) {
 TEST(Merge, OfZeroWeightsIsUnweightedUntilAWeightComes) {
   std::mt19937_64 random(5);
   auto pieces = randomPieces(random, 10, {0, 0, 0});
-  for (Piece& piece : pieces) piece.splat.weight = 1;
+  for (SplatAndValue& piece : pieces) piece.splat.weight = 1;
   Moments expected = momentsOf(pieces);
-  for (Piece& piece : pieces) piece.splat.weight = 0;
+  for (SplatAndValue& piece : pieces) piece.splat.weight = 0;
   expected.weight = 0;
   expectMoments(merged(pieces), expected, 1e-12);
 
@@ -211,13 +212,13 @@ TEST(Merge, OfZeroWeightsIsUnweightedUntilAWeightComes) {
 
 TEST(Merge, OfDegenerateSplatsIsFloored) {
   // A plane's worth of flat pieces, and points on a line: some axis has no extent at all.
-  std::vector<Piece> pieces(5);
+  std::vector<SplatAndValue> pieces(5);
   for (size_t n = 0; n < pieces.size(); ++n) {
     pieces[n].splat.position = {0.1 * static_cast<double>(n), 0.2 * static_cast<double>(n), 0};
     pieces[n].splat.axis = {1e-20, 1e-20, 1e-20};
     pieces[n].value.mean = static_cast<double>(n % 2);
   }
-  const Piece line = merged(pieces);
+  const SplatAndValue line = merged(pieces);
   const auto sigma = singularValues(line.splat.factor());
   EXPECT_NEAR(sigma[0], std::sqrt(12 * 2 * 0.05), 1e-9);
   EXPECT_NEAR(sigma[1] / sigma[0] / kAxisFloor, 1, 1e-3);
@@ -232,14 +233,14 @@ TEST(Merge, NeverExplainsMoreVarianceThanThereIs) {
   std::mt19937_64 random(8);
   std::normal_distribution<double> normal;
   for (int n = 0; n < 200; ++n) {
-    Piece far, thin;
+    SplatAndValue far, thin;
     far.splat.position = 10.0 * glm::dvec3(normal(random), normal(random), normal(random));
     far.splat.weight = 1e-16;
     thin.splat.axis = {1, 1, 1e-5};
     thin.splat.shear = {0, normal(random), normal(random)};
     thin.splat.weight = 1;
     thin.value.slope = {0, 0, 1};
-    const Piece out = merged({far, thin, thin});
+    const SplatAndValue out = merged({far, thin, thin});
     EXPECT_LE(glm::dot(out.value.slope, out.value.slope), 1 + 1e-12);
     EXPECT_NEAR(glm::dot(out.value.slope, out.value.slope) / 12 + out.value.variance, 1.0 / 12, 1e-12);
   }
@@ -273,10 +274,10 @@ TEST(VoxelMerger, KeepsVoxelsApartAndForgetsThemOnClear) {
 }
 
 /// Unit cells with their middles at `middles`, merged in a voxel of the size `voxel_size`.
-Piece mergedInVoxel(double voxel_size, const std::vector<glm::dvec3>& middles) {
+SplatAndValue mergedInVoxel(double voxel_size, const std::vector<glm::dvec3>& middles) {
   VoxelMerger voxels(1, 1);
   voxels.clear(voxel_size);
-  Piece out;
+  SplatAndValue out;
   for (const glm::dvec3& at : middles) {
     Splat splat;
     splat.weight = 1;
@@ -289,7 +290,7 @@ Piece mergedInVoxel(double voxel_size, const std::vector<glm::dvec3>& middles) {
 
 TEST(VoxelMerger, SplatsOfALatticeHaveItsBlur) {
   const std::vector<glm::dvec3> two{{0, 0, 0}, {1, 0, 0}};
-  const Piece own = mergedInVoxel(0, two), even = mergedInVoxel(3, two);
+  const SplatAndValue own = mergedInVoxel(0, two), even = mergedInVoxel(3, two);
   EXPECT_NEAR(own.splat.axis[0], 2, 1e-12);
   EXPECT_NEAR(even.splat.axis[0], std::sqrt(0.418 * 4 + 0.582 * 9), 1e-12);
   EXPECT_NEAR(even.splat.axis[1], std::sqrt(0.418 + 0.582 * 9), 1e-12);
@@ -299,17 +300,17 @@ TEST(VoxelMerger, SplatsOfALatticeHaveItsBlur) {
   EXPECT_EQ(even.value.variance, own.value.variance);
   EXPECT_NEAR(gradientOf(even.splat, even.value.slope).x, 0.25, 1e-12);
   // Cells that are longer than a voxel keep their own.
-  const Piece longer = mergedInVoxel(0.5, {{0, 0, 0}, {0, 0.1, 0}});
+  const SplatAndValue longer = mergedInVoxel(0.5, {{0, 0, 0}, {0, 0.1, 0}});
   EXPECT_NEAR(longer.splat.axis[0], 1, 1e-12);
 }
 
-struct Cell {
+struct CellBox {
   glm::dvec3 middle, size;
   uint32_t border_code;
 };
 
 /// The code of cells that are boxes.
-InwardAxes borderInVoxel(double voxel_size, const std::vector<Cell>& cells) {
+InwardAxes borderInVoxel(double voxel_size, const std::vector<CellBox>& cells) {
   VoxelMerger voxels(0, 1);
   voxels.clear(voxel_size);
   for (const auto& [middle, size, border_code] : cells) {

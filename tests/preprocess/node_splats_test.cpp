@@ -17,7 +17,7 @@ namespace curvisplat {
 namespace {
 
 /// ‖A Aᵀ - J Jᵀ‖ relative to ‖J Jᵀ‖.
-double shapeError(const Splat& splat, const glm::dmat3& jacobian) {
+double covarianceError(const Splat& splat, const glm::dmat3& jacobian) {
   const glm::dmat3 a = splat.factor();
   const glm::dmat3 expected = jacobian * glm::transpose(jacobian), found = a * glm::transpose(a);
   double error = 0, size = 0;
@@ -61,13 +61,13 @@ TEST(NodeSplats, OfAnAffineGridAreItsCellsAndSumToItsVolume) {
     EXPECT_TRUE(inner.regular);
     EXPECT_FALSE(inner.on_block_face);
     EXPECT_LT(glm::distance(inner.splat.position, origin + jacobian * glm::dvec3(2, 1, 3)), 1e-13);
-    EXPECT_LT(shapeError(inner.splat, jacobian), 1e-13);
+    EXPECT_LT(covarianceError(inner.splat, jacobian), 1e-13);
 
     // A node of the edge i = 4, k = 0: half cells along i and k.
     const NodeSplat& edge = out.splats[grid.at(4, 1, 0)];
     EXPECT_TRUE(edge.on_block_face);
     const glm::dmat3 quarter(0.5 * jacobian[0], jacobian[1], 0.5 * jacobian[2]);
-    EXPECT_LT(shapeError(edge.splat, quarter), 1e-12);
+    EXPECT_LT(covarianceError(edge.splat, quarter), 1e-12);
     EXPECT_NEAR(edge.splat.weight, std::abs(determinant) / 4, 1e-9);
     EXPECT_LT(glm::distance(edge.splat.position, origin + jacobian * glm::dvec3(3.75, 1, 0.25)), 1e-13);
     EXPECT_NEAR(edge.spacing,

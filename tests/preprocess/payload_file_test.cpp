@@ -162,7 +162,7 @@ std::vector<double> spooled(const TestFolder& folder, const std::string& text) {
   return values;
 }
 
-std::string errorOf(const TestFolder& folder, const std::string& text) {
+std::string spoolError(const TestFolder& folder, const std::string& text) {
   return curvisplat::errorOf([&] { spooled(folder, text); });
 }
 
@@ -194,12 +194,12 @@ TEST(AsciiSpool, NamesTheLineThatIsNotANumber) {
   const TestFolder folder("spool-errors");
   for (const char* bad :
        {"x", "1.5x", "0x10", "*5", "2*", "0*3", "-1*3", "1.5*2", "2*3*4", "1e", "--1", "1..2", "**"}) {
-    const std::string error = errorOf(folder, std::string("1 2\n3 4\n 5 ") + bad + " 6\n");
+    const std::string error = spoolError(folder, std::string("1 2\n3 4\n 5 ") + bad + " 6\n");
     EXPECT_NE(error.find(std::string("line 3 has \"") + bad + "\""), std::string::npos)
         << bad << ": " << error;
   }
-  expectSays(errorOf(folder, "1,\n,2"), "line 2 has no value between two commas");
-  expectSays(errorOf(folder, "1 999999999999999*2"), "repeats a number 999999999999999 times");
+  expectSays(spoolError(folder, "1,\n,2"), "line 2 has no value between two commas");
+  expectSays(spoolError(folder, "1 999999999999999*2"), "repeats a number 999999999999999 times");
   EXPECT_EQ(files(folder), 1u);
 }
 
@@ -218,9 +218,9 @@ TEST(AsciiSpool, NumbersAcrossChunksAreWhole) {
   }
   EXPECT_EQ(spooled(folder, text), expected);
   EXPECT_EQ(files(folder), 1u);  // the text alone
-  expectSays(errorOf(folder, text + " what?"),
+  expectSays(spoolError(folder, text + " what?"),
              fmt::format("line {} has", std::count(text.begin(), text.end(), '\n') + 1));
-  expectSays(errorOf(folder, std::string(3 << 20, '1')), "without a space");
+  expectSays(spoolError(folder, std::string(3 << 20, '1')), "without a space");
 }
 
 TEST(AsciiSpool, CountsTheDigitsThatWereWritten) {

@@ -19,8 +19,8 @@ using namespace test;
 constexpr ByteOrder kLittle = ByteOrder::kLittle, kBig = ByteOrder::kBig;
 constexpr RecordMarkers kC = RecordMarkers::kNone, kFortran = RecordMarkers::kBytes4;
 
-std::unique_ptr<GridSource> open(const TestFolder& folder, const Bytes& grid,
-                                 const Bytes* solution = nullptr) {
+std::unique_ptr<GridSource> openPlot3d(const TestFolder& folder, const Bytes& grid,
+                                       const Bytes* solution = nullptr) {
   OpenGridOptions options;
   options.grid = folder.write("grid", grid);
   if (solution) options.solutions.push_back(folder.write("solution", *solution));
@@ -28,8 +28,8 @@ std::unique_ptr<GridSource> open(const TestFolder& folder, const Bytes& grid,
   return openGrid(options);
 }
 
-std::string errorOf(const TestFolder& folder, const Bytes& grid, const Bytes* solution = nullptr) {
-  return curvisplat::errorOf([&] { open(folder, grid, solution); });
+std::string plot3dError(const TestFolder& folder, const Bytes& grid, const Bytes* solution = nullptr) {
+  return curvisplat::errorOf([&] { openPlot3d(folder, grid, solution); });
 }
 
 /// Expects that a file's first bytes are read as those of the whole file.
@@ -78,11 +78,12 @@ TEST(Plot3dDamage, EveryPrefixOfAGridIsRefusedOrReadRight) {
           const Plot3dLayout layout{Plot3dKind::kGrid, false, order, records, precision, true, blanking};
           SCOPED_TRACE(describe(layout));
           const Bytes file = plot3dBytes(layout, doubleBlocks(0));
-          const auto whole = open(folder, file);
+          const auto whole = openPlot3d(folder, file);
           size_t accepted = 0;
           for (size_t size = 0; size < file.size(); size = nextLength(size)) {
             try {
-              const auto source = open(folder, {file.begin(), file.begin() + static_cast<ptrdiff_t>(size)});
+              const auto source =
+                  openPlot3d(folder, {file.begin(), file.begin() + static_cast<ptrdiff_t>(size)});
               ++accepted;
               ASSERT_NO_FATAL_FAILURE(expectSameNodes(*source, *whole)) << size;
             } catch (const Error& error) {
@@ -107,14 +108,14 @@ TEST(Plot3dDamage, EveryPrefixOfASolutionIsRefused) {
         const Bytes grid = plot3dBytes(layout, blocks);
         layout.kind = kind;
         const Bytes file = plot3dBytes(layout, blocks);
-        EXPECT_EQ(errorOf(folder, grid, &file), "");
+        EXPECT_EQ(plot3dError(folder, grid, &file), "");
         layout.precision_bytes = 4;
         const size_t size_in_single = plot3dBytes(layout, blocks).size();
         for (size_t size = 0; size < file.size(); size = nextLength(size)) {
           if (records == kC && size == size_in_single)
             continue;  // a whole file, and the bits are as they are
           const Bytes prefix(file.begin(), file.begin() + static_cast<ptrdiff_t>(size));
-          ASSERT_NE(errorOf(folder, grid, &prefix), "") << size << " of " << file.size();
+          ASSERT_NE(plot3dError(folder, grid, &prefix), "") << size << " of " << file.size();
         }
       }
 }
@@ -123,10 +124,10 @@ TEST(Plot3dDamage, EveryPrefixOfATextIsRefused) {
   const TestFolder folder("text-prefixes");
   const Plot3dLayout layout{Plot3dKind::kGrid, true, kLittle, kC, 8, false, false};
   const Bytes file = plot3dText(layout, {testBlock(2, 3, 2, 0)});
-  EXPECT_EQ(errorOf(folder, file), "");
+  EXPECT_EQ(plot3dError(folder, file), "");
   // The last number may lose digits unnoticed.
   for (size_t size = 0; size + 24 < file.size(); ++size)
-    ASSERT_NE(errorOf(folder, {file.begin(), file.begin() + static_cast<ptrdiff_t>(size)}), "") << size;
+    ASSERT_NE(plot3dError(folder, {file.begin(), file.begin() + static_cast<ptrdiff_t>(size)}), "") << size;
 }
 
 TEST(Plot3dDamage, FlippedBytesNeverCrash) {
@@ -139,7 +140,7 @@ TEST(Plot3dDamage, FlippedBytesNeverCrash) {
       Bytes damaged = file;
       damaged[random() % (n % 2 ? damaged.size() : 60)] = static_cast<std::byte>(random());
       try {
-        const auto source = open(folder, damaged);
+        const auto source = openPlot3d(folder, damaged);
         NodeArrays nodes;
         for (uint32_t b = 0; b < source->description().blocks.size(); ++b) {
           const GridBlock& block = source->description().blocks[b];
@@ -156,9 +157,9 @@ TEST(Plot3dDamage, TrailingBytesAreAWarning) {
   for (const RecordMarkers records : {kC, kFortran}) {
     const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, records, 4, false, false};
     Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
-    const auto whole = open(folder, file);
+    const auto whole = openPlot3d(folder, file);
     file.insert(file.end(), 484, std::byte{});
-    const auto source = open(folder, file);
+    const auto source = openPlot3d(folder, file);
     EXPECT_EQ(source->description().warnings, std::vector<std::string>{"grid: 484 trailing bytes ignored"});
     expectSameNodes(*source, *whole);
   }
@@ -169,7 +170,7 @@ TEST(Plot3dDamage, ATruncatedIblankIsNotTakenForTrailingBytes) {
   const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kC, 4, false, true};
   Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
   file.resize(12 + 12 * 9 * 8 * 7 + 300);
-  const std::string error = errorOf(folder, file);
+  const std::string error = plot3dError(folder, file);
   expectSays(error, "300 bytes that look like a truncated iblank");
   expectSays(error, "--iblank no");
 }
@@ -179,7 +180,7 @@ TEST(Plot3dDamage, TruncatedFilesAreReportedWithTheExpectedSize) {
   const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kC, 4, false, false};
   Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
   file.resize(4000);
-  const std::string error = errorOf(folder, file);
+  const std::string error = plot3dError(folder, file);
   expectSays(error, "4000 bytes fit no PLOT3D grid");
   expectSays(error, "9x8x7: found 4000 bytes; expected 6060 (single precision, no iblank)");
   expectSays(error, "the file seems to be truncated");
@@ -188,7 +189,7 @@ TEST(Plot3dDamage, TruncatedFilesAreReportedWithTheExpectedSize) {
   fortran.records = kFortran;
   file = plot3dBytes(fortran, {testBlock(9, 8, 7, 0)});
   file.resize(4000);
-  const std::string record_error = errorOf(folder, file);
+  const std::string record_error = plot3dError(folder, file);
   expectSays(record_error, "block 1 of 9x8x7 nodes: the record at byte 20 declares 6048 bytes");
 }
 
@@ -204,7 +205,7 @@ TEST(Plot3dDamage, PlanesFormatIsRefusedByName) {
     for (int n = 0; n < 3 * 6 * 5; ++n) appendNumber(plane, 1.0f + static_cast<float>(n), kLittle);
     appendRecord(file, plane, layout);
   }
-  const std::string error = errorOf(folder, file);
+  const std::string error = plot3dError(folder, file);
   expectSays(error, "expected the whole format");
 }
 
@@ -214,7 +215,7 @@ TEST(Plot3dDamage, NoiseInTheRightSizeIsRefused) {
   Bytes file;
   for (const int32_t n : {6, 5, 4}) appendNumber(file, n, kLittle);
   for (int n = 0; n < 3 * 6 * 5 * 4; ++n) appendNumber(file, static_cast<uint32_t>(random()), kLittle);
-  const std::string error = errorOf(folder, file);
+  const std::string error = plot3dError(folder, file);
   expectSays(error, "implausible values");
 }
 
@@ -224,7 +225,7 @@ TEST(Plot3dDamage, SolutionOfOtherDimensionsNamesBoth) {
   const Bytes grid = plot3dBytes(layout, {testBlock(6, 5, 4, 0), testBlock(3, 3, 3, 0)});
   layout.kind = Plot3dKind::kQ;
   const Bytes q = plot3dBytes(layout, {testBlock(6, 5, 4, 5), testBlock(3, 3, 2, 5)});
-  const std::string error = errorOf(folder, grid, &q);
+  const std::string error = plot3dError(folder, grid, &q);
   expectSays(error, "solution of 2 blocks (6x5x4, 3x3x2), but the grid");
   expectSays(error, "2 blocks (6x5x4, 3x3x3)");
 }
@@ -233,10 +234,10 @@ TEST(Plot3dDamage, WrongKindsAreNamed) {
   const TestFolder folder("kinds");
   Plot3dLayout layout{Plot3dKind::kGrid, false, kLittle, kFortran, 4, true, false};
   const Bytes grid = plot3dBytes(layout, {testBlock(6, 5, 4, 0)});
-  const std::string as_solution = errorOf(folder, grid, &grid);
+  const std::string as_solution = plot3dError(folder, grid, &grid);
   expectSays(as_solution, "it would fit as a grid of 1 block of 6x5x4");
   layout.kind = Plot3dKind::kQ;
-  const std::string as_grid = errorOf(folder, plot3dBytes(layout, {testBlock(6, 5, 4, 5)}));
+  const std::string as_grid = plot3dError(folder, plot3dBytes(layout, {testBlock(6, 5, 4, 5)}));
   expectSays(as_grid, "it would fit as a Q solution of 1 block of 6x5x4");
 }
 
@@ -270,7 +271,7 @@ TEST(Plot3dDamage, AFailingDiskIsNotTakenForAnotherLayout) {
 
 TEST(Plot3dDamage, EmptyFilesAreNamed) {
   const TestFolder folder("empty");
-  expectSays(errorOf(folder, {}), "is empty");
+  expectSays(plot3dError(folder, {}), "is empty");
 }
 
 }  // namespace

@@ -48,8 +48,8 @@ std::vector<TestBlock> blocksFor(const Plot3dLayout& layout, uint32_t components
   return blocks;
 }
 
-OpenGridOptions optionsFor(const TestFolder& folder, const std::string& grid,
-                           const std::vector<std::string>& solutions = {}) {
+OpenGridOptions openOptionsFor(const TestFolder& folder, const std::string& grid,
+                               const std::vector<std::string>& solutions = {}) {
   OpenGridOptions options;
   options.grid = folder.path() / grid;
   for (const std::string& solution : solutions) options.solutions.push_back(folder.path() / solution);
@@ -57,7 +57,7 @@ OpenGridOptions optionsFor(const TestFolder& folder, const std::string& grid,
   return options;
 }
 
-std::string errorOf(const OpenGridOptions& options) {
+std::string layoutError(const OpenGridOptions& options) {
   return curvisplat::errorOf([&] { openGrid(options); });
 }
 
@@ -92,7 +92,7 @@ void expectBox(const GridSource& source, uint32_t b, const NodeBox& box, const T
 /// Grid, Q and function file of one layout through openGrid: the layouts in words, and all values.
 void expectRoundTrip(const TestFolder& folder, const Plot3dLayout& layout,
                      const std::vector<TestBlock>& q_blocks, const std::vector<TestBlock>& function_blocks) {
-  const auto source = openGrid(optionsFor(folder, "a.xyz", {"a.q", "a.fun"}));
+  const auto source = openGrid(openOptionsFor(folder, "a.xyz", {"a.q", "a.fun"}));
   const GridDescription& description = source->description();
   EXPECT_EQ(
       description.format,
@@ -155,7 +155,7 @@ TEST(Plot3dLayouts, RoundingErrorsOfZeroAreNoNoise) {
       for (size_t n = 0; n < block.coordinates[1].size(); ++n)
         if (n % 2 == 0) block.coordinates[1][n] = n % 4 == 0 ? 1e-48 : -3e-65;
     folder.write("a.xyz", plot3dBytes(layout, blocks, subrecord));
-    const auto source = openGrid(optionsFor(folder, "a.xyz", {}));
+    const auto source = openGrid(openOptionsFor(folder, "a.xyz", {}));
     EXPECT_EQ(source->description().format, fmt::format("PLOT3D grid a.xyz: {}", describe(layout)));
   }
 }
@@ -165,7 +165,7 @@ TEST(Plot3dLayouts, ForcingEverythingReadsTheSame) {
   for (const auto& [layout, subrecord] : everyBinaryLayout()) {
     const auto blocks = blocksFor(layout, 5);
     folder.write("a.xyz", plot3dBytes(layout, blocks, subrecord));
-    OpenGridOptions options = optionsFor(folder, "a.xyz");
+    OpenGridOptions options = openOptionsFor(folder, "a.xyz");
     options.force = {
         false,          layout.byte_order, layout.records, layout.precision_bytes, layout.multi_block,
         layout.blanking};
@@ -186,9 +186,9 @@ TEST(Plot3dLayouts, ForcingAnythingElseIsRefusedAndTheLayoutNamed) {
   wrong[4].multi_block = false;
   wrong[5].blanking = false;
   for (const Plot3dForce& force : wrong) {
-    OpenGridOptions options = optionsFor(folder, "a.xyz");
+    OpenGridOptions options = openOptionsFor(folder, "a.xyz");
     options.force = force;
-    const std::string error = errorOf(options);
+    const std::string error = layoutError(options);
     EXPECT_NE(error, "");
     if (force.ascii) continue;
     expectSays(error, describe(layout));
@@ -200,7 +200,7 @@ TEST(Plot3dLayouts, ThreadsReadAtOnce) {
   const Plot3dLayout layout{Plot3dKind::kGrid, false, ByteOrder::kBig, RecordMarkers::kBytes4, 4, true, true};
   const auto blocks = blocksFor(layout, 5);
   folder.write("a.xyz", plot3dBytes(layout, blocks, 101));
-  const auto source = openGrid(optionsFor(folder, "a.xyz"));
+  const auto source = openGrid(openOptionsFor(folder, "a.xyz"));
   std::vector<std::thread> threads;
   for (uint32_t t = 0; t < 4; ++t)
     threads.emplace_back([&, t] {
@@ -225,7 +225,7 @@ TEST(Plot3dLayouts, AreNeverMistakenForOneAnother) {
       blocks.push_back(testBlock(1 + random() % 4, 1 + random() % 4, 1 + random() % 4, 5));
     folder.write("a.xyz", plot3dBytes(layout, blocks, subrecord));
     try {
-      const auto source = openGrid(optionsFor(folder, "a.xyz"));
+      const auto source = openGrid(openOptionsFor(folder, "a.xyz"));
       ++detected;
       EXPECT_EQ(source->description().format, "PLOT3D grid a.xyz: " + describe(layout));
     } catch (const Error& error) {
@@ -244,8 +244,8 @@ TEST(Plot3dLayouts, TwoThatFitEquallyWellAreNamedWithTheOptionsThatDecide) {
   for (const int32_t n : {1, 1, 1, 2}) appendNumber(file, n, ByteOrder::kLittle);
   for (const float value : {1.f, 1.f, 1.f, 1.f, 1.f, 0.f}) appendNumber(file, value, ByteOrder::kLittle);
   folder.write("a.xyz", file);
-  OpenGridOptions options = optionsFor(folder, "a.xyz");
-  const std::string error = errorOf(options);
+  OpenGridOptions options = openOptionsFor(folder, "a.xyz");
+  const std::string error = layoutError(options);
   for (const char* part : {"a.xyz: fits 2 layouts equally well", "1 block of 1x1x1", "1 block of 1x1x2",
                            "--precision, --blocks, --iblank"})
     expectSays(error, part);

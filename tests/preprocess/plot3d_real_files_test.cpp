@@ -14,19 +14,19 @@
 namespace curvisplat {
 namespace {
 
-const std::filesystem::path kShared = CURVISPLAT_SHARED_DATA;
+const std::filesystem::path kRealGrids = CURVISPLAT_SHARED_DATA;
 
 class RealFiles : public testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::is_directory(kShared)) GTEST_SKIP() << "needs " << kShared;
+    if (!std::filesystem::is_directory(kRealGrids)) GTEST_SKIP() << "needs " << kRealGrids;
   }
 
   static std::unique_ptr<GridSource> open(const std::string& grid,
                                           const std::vector<std::string>& solutions = {}) {
     OpenGridOptions options;
-    options.grid = kShared / grid;
-    for (const std::string& solution : solutions) options.solutions.push_back(kShared / solution);
+    options.grid = kRealGrids / grid;
+    for (const std::string& solution : solutions) options.solutions.push_back(kRealGrids / solution);
     return openGrid(options);
   }
 
@@ -111,7 +111,7 @@ TEST_F(RealFiles, LoxPostDrawsNegativeIblank) {
   EXPECT_EQ(content.scalars[0].min, 1);
   EXPECT_EQ(content.scalars[0].max, 1);
 
-  const auto file = std::make_shared<InputFile>(kShared / "lox_post/postxyz.bin");
+  const auto file = std::make_shared<InputFile>(kRealGrids / "lox_post/postxyz.bin");
   const Plot3dFile grid(detectPlot3dGrid(file, {}, std::filesystem::temp_directory_path()).fit);
   std::vector<int32_t> iblank(content.nodes);
   grid.readIblank(0, {0, 76, 0, 38}, iblank);

@@ -130,9 +130,9 @@ TEST(WritePlot3d, JoinsBatchesSeamlessly) {
 }
 
 // A disk that is full after `room` bytes.
-class FullDisk : public SystemCalls {
+class DiskWithRoom : public SystemCalls {
  public:
-  explicit FullDisk(size_t room) : room_(room) {}
+  explicit DiskWithRoom(size_t room) : room_(room) {}
   ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset) override {
     if (count > room_) {
       errno = ENOSPC;
@@ -150,7 +150,7 @@ TEST(WritePlot3d, LeavesWhatWasThereWhenTheDiskIsFull) {
   const TemporaryFolder folder;
   std::ofstream(folder / "scene.xyz") << "old";
   Progress progress;
-  FullDisk disk(300);
+  DiskWithRoom disk(300);
   const ScopedSystemCalls scope(disk);
   expectError(
       [&] {

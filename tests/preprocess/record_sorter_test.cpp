@@ -23,10 +23,10 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kSize = 5;  // of a record: the last two are made of its number
+constexpr size_t kRecordDoubles = 5;  // of a record: the last two are made of its number
 constexpr size_t kCount = 5000;
 
-std::array<double, kSize> recordOf(double along, uint64_t number) {
+std::array<double, kRecordDoubles> recordOf(double along, uint64_t number) {
   const auto n = static_cast<double>(number);
   return {along, -along, std::bit_cast<double>(number), n + 0.5, n * 3};
 }
@@ -41,7 +41,7 @@ class RecordSorterTest : public testing::Test {
     std::shuffle(added.begin(), added.end(), std::mt19937(1));
     std::sort(expected.begin(), expected.end());
 
-    RecordSorter sorter(kSize, memory_bytes, folder_.path());
+    RecordSorter sorter(kRecordDoubles, memory_bytes, folder_.path());
     for (const auto& [position, number] : added) {
       sorter.add(recordOf(position, number));
     }
@@ -99,7 +99,7 @@ TEST_F(RecordSorterTest, VisitsRangesThatAreAllTogether) {
   for (const auto& [name, along] : positions())
     for (const uint64_t memory_bytes : {1 << 20, 3000}) {
       SCOPED_TRACE(fmt::format("{}, {} bytes", name, memory_bytes));
-      RecordSorter sorter(kSize, memory_bytes, folder_.path());
+      RecordSorter sorter(kRecordDoubles, memory_bytes, folder_.path());
       for (size_t n = 0; n < along.size(); ++n) sorter.add(recordOf(along[n], n));
       sorter.sort(3);
       std::vector<double> ends = sorter.cutsInto(7);
@@ -126,7 +126,7 @@ TEST_F(RecordSorterTest, TakesRecordsFromSeveralThreads) {
   constexpr size_t kThreads = 8, kOfThread = 4000;
   // All stay in memory; some runs; two records a run.
   for (const uint64_t memory_bytes : {4 << 20, 1'500'000, 100'000, 1}) {
-    RecordSorter sorter(kSize, memory_bytes, folder_.path());
+    RecordSorter sorter(kRecordDoubles, memory_bytes, folder_.path());
     const size_t of_thread = memory_bytes == 1 ? 20 : kOfThread;
     std::vector<std::thread> threads;
     for (size_t thread = 0; thread < kThreads; ++thread)
@@ -157,7 +157,7 @@ TEST_F(RecordSorterTest, TakesRecordsFromSeveralThreads) {
 
 TEST_F(RecordSorterTest, EndsAVisitWhenItIsToldTo) {
   for (const uint64_t memory_bytes : {1 << 20, 3000}) {
-    RecordSorter sorter(kSize, memory_bytes, folder_.path());
+    RecordSorter sorter(kRecordDoubles, memory_bytes, folder_.path());
     for (size_t n = 0; n < kCount; ++n) sorter.add(recordOf(static_cast<double>(n), n));
     sorter.sort();
     uint64_t last = 0;

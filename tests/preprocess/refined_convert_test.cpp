@@ -61,7 +61,7 @@ std::unique_ptr<GridSource> duct() {
 
 /// Half a pipe of two blocks: the first's last i is the second's first j, and k runs the other way. No scalar has a value in a
 /// corner of the first block.
-std::unique_ptr<GridSource> pipe(Centring centring = Centring::kNode) {
+std::unique_ptr<GridSource> halfPipe(Centring centring = Centring::kNode) {
   return std::make_unique<FunctionGridSource>(
       std::vector{gridBlock(7, 5, 6), gridBlock(5, 8, 6)}, 2,
       [](const GridNode& node) {
@@ -80,9 +80,10 @@ std::unique_ptr<GridSource> pipe(Centring centring = Centring::kNode) {
 }
 
 TEST_F(RefinedConvert, HasTheVolumeOfTheGrid) {
-  for (const auto& [name, open] : {std::pair{"duct", std::function([] { return duct(); })},
-                                   std::pair{"nodes", std::function([] { return pipe(); })},
-                                   std::pair{"cells", std::function([] { return pipe(Centring::kCell); })}}) {
+  for (const auto& [name, open] :
+       {std::pair{"duct", std::function([] { return duct(); })},
+        std::pair{"nodes", std::function([] { return halfPipe(); })},
+        std::pair{"cells", std::function([] { return halfPipe(Centring::kCell); })}}) {
     SCOPED_TRACE(name);
     const ConvertReport whole = convertTo(std::string(name) + "1", *open());
     uint64_t nodes = whole.nodes;
@@ -101,8 +102,8 @@ TEST_F(RefinedConvert, HasTheVolumeOfTheGrid) {
 
 TEST_F(RefinedConvert, MergesTheNewNodesOfJoints) {
   const uint32_t parts = 4;
-  EXPECT_EQ(convertTo("1", *pipe()).merged_nodes, 5u * 6);
-  EXPECT_EQ(convertTo("4", *refined(pipe(), parts)).merged_nodes, (4 * parts + 1) * (5 * parts + 1));
+  EXPECT_EQ(convertTo("1", *halfPipe()).merged_nodes, 5u * 6);
+  EXPECT_EQ(convertTo("4", *refined(halfPipe(), parts)).merged_nodes, (4 * parts + 1) * (5 * parts + 1));
 }
 
 TEST_F(RefinedConvert, HasTheSameBytesForAnyThreadsMemoryAndRanks) {
@@ -110,7 +111,7 @@ TEST_F(RefinedConvert, HasTheSameBytesForAnyThreadsMemoryAndRanks) {
     ConvertOptions options = optionsFor("one");
     options.threads = 1;
     options.overwrite = true;
-    expectSameCaches(*refined(pipe(centring), 4), options,
+    expectSameCaches(*refined(halfPipe(centring), 4), options,
                      {{.threads = 2, .bucket_splats = 500, .slab_bytes = 40'000},
                       {.bucket_splats = 500, .slab_bytes = 40'000, .ranks = 2},
                       {.bucket_splats = 500, .slab_bytes = 40'000, .ranks = 3}});
@@ -123,16 +124,16 @@ TEST_F(RefinedConvert, TakesFurtherScalars) {
     ConvertOptions both;
     both.scalars = {0, 1};
     both.overwrite = true;
-    convertTo("both", *refined(pipe(centring), 3), both);
+    convertTo("both", *refined(halfPipe(centring), 3), both);
     ConvertOptions first;
     first.overwrite = true;
-    convertTo("added", *refined(pipe(centring), 3), first);
+    convertTo("added", *refined(halfPipe(centring), 3), first);
     AddScalarOptions options;
     options.cache = folder_ / "added";
     options.scalars = {1};
     options.memory_bytes = kMemory;
     Progress progress;
-    const auto fine = refined(pipe(centring), 3);
+    const auto fine = refined(halfPipe(centring), 3);
     addScalars(*fine, options, progress);
     for (const char* const name : {"geometry.bin", "var.0.bin", "var.1.bin"})
       EXPECT_TRUE(files("added").at(name) == files("both").at(name)) << name << cells;

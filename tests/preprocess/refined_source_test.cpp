@@ -22,7 +22,7 @@ namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
-using Index = std::array<uint64_t, 3>;
+using NodeIndex = std::array<uint64_t, 3>;
 
 /// SplitMix64: seeding the standard's engines for each node would take nearly all of the time.
 struct NodeRandom {
@@ -39,7 +39,7 @@ struct NodeRandom {
 };
 
 /// Random, and the same for the same node.
-glm::dvec3 jolt(const Index& node, double size) {
+glm::dvec3 jolt(const NodeIndex& node, double size) {
   NodeRandom random{node[0] + 100 * node[1] + 10'000 * node[2] + 1};
   std::uniform_real_distribution<double> part(-size, size);
   const double x = part(random), y = part(random);
@@ -47,23 +47,23 @@ glm::dvec3 jolt(const Index& node, double size) {
 }
 
 /// A node of a lattice of uneven, skewed cells far from the origin.
-glm::dvec3 unevenPosition(const Index& n) {
+glm::dvec3 unevenPosition(const NodeIndex& n) {
   const glm::dvec3 even(static_cast<double>(n[0]), static_cast<double>(n[1]), static_cast<double>(n[2]));
   return glm::dvec3(1e3, -3e2, 7.0) + even + 0.3 * even.z * glm::dvec3(1, 0.5, 0) + jolt(n, 0.3);
 }
 
-float unevenValue(const Index& n) {
+float unevenValue(const NodeIndex& n) {
   return static_cast<float>(jolt({n[0] + 50, n[1], n[2]}, 5.0).x);
 }
 
 using Change = std::function<void(const GridNode&, NodeValues&)>;
 
-std::unique_ptr<FunctionGridSource> unevenGrid(const Index& nodes, const Change& change = {},
+std::unique_ptr<FunctionGridSource> unevenGrid(const NodeIndex& nodes, const Change& change = {},
                                                Centring centring = Centring::kNode) {
   return std::make_unique<FunctionGridSource>(
       std::vector{gridBlock(nodes[0], nodes[1], nodes[2])}, 1,
       [=](const GridNode& node) {
-        const Index n{node.i, node.j, node.k};
+        const NodeIndex n{node.i, node.j, node.k};
         NodeValues values;
         values.position = unevenPosition(n);
         values.scalars = {unevenValue(n)};
@@ -73,7 +73,7 @@ std::unique_ptr<FunctionGridSource> unevenGrid(const Index& nodes, const Change&
       centring);
 }
 
-size_t atOf(const GridBlock& block, const Index& n) {
+size_t atOf(const GridBlock& block, const NodeIndex& n) {
   return (n[2] * block.nj + n[1]) * block.ni + n[0];
 }
 
@@ -85,15 +85,15 @@ template <typename Visit>
 void forEachIndex(const GridBlock& block, const Visit& visit) {
   for (uint64_t k = 0; k < block.nk; ++k)
     for (uint64_t j = 0; j < block.nj; ++j)
-      for (uint64_t i = 0; i < block.ni; ++i) visit(Index{i, j, k});
+      for (uint64_t i = 0; i < block.ni; ++i) visit(NodeIndex{i, j, k});
 }
 
 /// Weighted sum over the corners of the cell that a refined node lies in.
 template <typename Value, typename Of>
-Value trilinear(const Index& node, const CellCuts& cuts, const Index& counts, const Of& of) {
+Value trilinear(const NodeIndex& node, const CellCuts& cuts, const NodeIndex& counts, const Of& of) {
   Value sum{};
   for (unsigned corner = 0; corner < 8; ++corner) {
-    Index n;
+    NodeIndex n;
     double weight = 1;
     for (size_t axis = 0; axis < 3; ++axis) {
       const double share = static_cast<double>(node[axis] % cuts[axis]) / cuts[axis];
@@ -107,24 +107,25 @@ Value trilinear(const Index& node, const CellCuts& cuts, const Index& counts, co
 }
 
 TEST(RefinedSource, CutsCellsByTheirTrilinearMap) {
-  const Index counts{3, 4, 2};
+  const NodeIndex counts{3, 4, 2};
   for (const CellCuts& cuts : {kWholeCells, CellCuts{2, 2, 2}, CellCuts{3, 3, 3}, CellCuts{16, 16, 16},
                                CellCuts{1, 2, 1}, CellCuts{4, 1, 2}, CellCuts{2, 3, 8}}) {
     const Refinement refinement({cuts});
     const auto fine = refined(unevenGrid(counts), refinement);
     const GridBlock& block = fine->description().blocks[0];
-    EXPECT_EQ((Index{block.ni, block.nj, block.nk}), (Index{2 * cuts[0] + 1, 3 * cuts[1] + 1, cuts[2] + 1}));
+    EXPECT_EQ((NodeIndex{block.ni, block.nj, block.nk}),
+              (NodeIndex{2 * cuts[0] + 1, 3 * cuts[1] + 1, cuts[2] + 1}));
     EXPECT_EQ(fine->description().refinement, refinement);
     const NodeArrays nodes = allNodes(*fine, 0);
     ASSERT_EQ(nodes.x.size(), block.nodes());
-    forEachIndex(block, [&](const Index& n) {
+    forEachIndex(block, [&](const NodeIndex& n) {
       const size_t at = atOf(block, n);
       const glm::dvec3 found = positionOf(nodes, at);
       EXPECT_LT(glm::length(found - trilinear<glm::dvec3>(n, cuts, counts, unevenPosition)), 1e-12 * 1e3);
       EXPECT_NEAR(nodes.scalars[0][at], trilinear<double>(n, cuts, counts, unevenValue), 1e-5);
       EXPECT_EQ(nodes.blank[at], 0);
       if (n[0] % cuts[0] + n[1] % cuts[1] + n[2] % cuts[2] > 0) return;
-      const Index old{n[0] / cuts[0], n[1] / cuts[1], n[2] / cuts[2]};
+      const NodeIndex old{n[0] / cuts[0], n[1] / cuts[1], n[2] / cuts[2]};
       EXPECT_EQ(found, unevenPosition(old));
       EXPECT_EQ(nodes.scalars[0][at], unevenValue(old));
     });
@@ -133,11 +134,11 @@ TEST(RefinedSource, CutsCellsByTheirTrilinearMap) {
 
 /// Whether all nodes of the cell are there; along an axis with one plane it has no thickness.
 template <typename IsThere>
-bool isWhole(const GridBlock& block, const Index& cell, const IsThere& is_there) {
+bool isWhole(const GridBlock& block, const NodeIndex& cell, const IsThere& is_there) {
   for (unsigned corner = 0; corner < 8; ++corner) {
-    const Index n{std::min(cell[0] + (corner & 1), block.ni - 1),
-                  std::min(cell[1] + (corner >> 1 & 1), block.nj - 1),
-                  std::min(cell[2] + (corner >> 2 & 1), block.nk - 1)};
+    const NodeIndex n{std::min(cell[0] + (corner & 1), block.ni - 1),
+                      std::min(cell[1] + (corner >> 1 & 1), block.nj - 1),
+                      std::min(cell[2] + (corner >> 2 & 1), block.nk - 1)};
     if (!is_there(n)) return false;
   }
   return true;
@@ -146,7 +147,7 @@ bool isWhole(const GridBlock& block, const Index& cell, const IsThere& is_there)
 /// Why some nodes are gone: blanked, by value, not finite or not in a place.
 enum class Gone { kBlanked, kByValue, kNotFinite, kNowhere };
 
-std::unique_ptr<FunctionGridSource> gridWithGone(const Index& counts, uint64_t seed, Gone how,
+std::unique_ptr<FunctionGridSource> gridWithGone(const NodeIndex& counts, uint64_t seed, Gone how,
                                                  Centring centring = Centring::kNode) {
   return unevenGrid(
       counts,
@@ -169,7 +170,7 @@ TEST(RefinedSource, DrawsThePartsOfCellsThatAreDrawn) {
   };
   for (const Gone how : {Gone::kBlanked, Gone::kByValue, Gone::kNotFinite, Gone::kNowhere})
     for (const uint32_t parts : {2u, 3u})
-      for (const Index& counts : {Index{6, 5, 4}, Index{7, 1, 6}, Index{2, 2, 2}}) {
+      for (const NodeIndex& counts : {NodeIndex{6, 5, 4}, NodeIndex{7, 1, 6}, NodeIndex{2, 2, 2}}) {
         const auto grid = gridWithGone(counts, 77, how);
         const GridBlock& coarse = grid->description().blocks[0];
         const NodeArrays before = allNodes(*grid, 0);
@@ -177,21 +178,22 @@ TEST(RefinedSource, DrawsThePartsOfCellsThatAreDrawn) {
         const GridBlock& block = fine->description().blocks[0];
         const NodeArrays nodes = allNodes(*fine, 0);
         uint64_t whole = 0;
-        forEachIndex(block, [&](const Index& n) {
-          const Index cell{n[0] / parts, n[1] / parts, n[2] / parts};
+        forEachIndex(block, [&](const NodeIndex& n) {
+          const NodeIndex cell{n[0] / parts, n[1] / parts, n[2] / parts};
           if (n[0] % parts + n[1] % parts + n[2] % parts == 0) {
             EXPECT_EQ(nodes.blank[atOf(block, n)], before.blank[atOf(coarse, cell)]);
           }
           const auto ends = [](uint64_t at, uint64_t count) { return at + 1 >= count && count > 1; };
           if (ends(n[0], block.ni) || ends(n[1], block.nj) || ends(n[2], block.nk)) return;
-          const bool is_drawn =
-              isWhole(coarse, cell, [&](const Index& old) { return is_there(before, atOf(coarse, old)); });
-          EXPECT_EQ(isWhole(block, n, [&](const Index& node) { return is_there(nodes, atOf(block, node)); }),
-                    is_drawn)
+          const bool is_drawn = isWhole(
+              coarse, cell, [&](const NodeIndex& old) { return is_there(before, atOf(coarse, old)); });
+          EXPECT_EQ(
+              isWhole(block, n, [&](const NodeIndex& node) { return is_there(nodes, atOf(block, node)); }),
+              is_drawn)
               << n[0] << ' ' << n[1] << ' ' << n[2];
           whole += is_drawn;
         });
-        EXPECT_TRUE(whole > 0 || counts == (Index{2, 2, 2}));
+        EXPECT_TRUE(whole > 0 || counts == (NodeIndex{2, 2, 2}));
         expectPartsOfRows(*fine, scalar);
       }
 }
@@ -221,7 +223,7 @@ TEST(RefinedSource, ReadsLargeBoxesByPlanes) {
 }
 
 /// Cells that grow by 1.4 along i, 1 long along j and k; `valueOf(i, j, k)` of those but the last along each axis.
-std::unique_ptr<GridSource> growingCells(const std::function<double(const Index&)>& valueOf) {
+std::unique_ptr<GridSource> growingCells(const std::function<double(const NodeIndex&)>& valueOf) {
   return std::make_unique<FunctionGridSource>(
       std::vector{gridBlock(9, 4, 5)}, 1,
       [=](const GridNode& node) {
@@ -241,14 +243,14 @@ double middleOf(uint64_t i) {
 
 TEST(RefinedSource, PartsOfCellsFollowALinearField) {
   const auto field = [](double x, double y, double z) { return 2 * x - 3 * y + z + 20; };
-  const auto fine = refined(growingCells([&](const Index& n) {
+  const auto fine = refined(growingCells([&](const NodeIndex& n) {
                               return field(middleOf(n[0]), static_cast<double>(n[1]) + 0.5,
                                            static_cast<double>(n[2]) + 0.5);
                             }),
                             Refinement(std::vector<CellCuts>{{2, 1, 4}}));
   const NodeArrays nodes = allNodes(*fine, 0);
   const GridBlock& block = fine->description().blocks[0];
-  forEachIndex(block, [&](const Index& n) {
+  forEachIndex(block, [&](const NodeIndex& n) {
     // Cells at a border where no cell beside them has a larger value have no values beyond their own.
     const bool at_border = n[0] < 2 || n[0] >= 14 || n[1] != 1 || n[2] < 4 || n[2] >= 12;
     if (at_border) return;
@@ -261,7 +263,7 @@ TEST(RefinedSource, PartsOfCellsFollowALinearField) {
 
 TEST(RefinedSource, PartsOfCellsHaveItsMeanAndNoNewExtremes) {
   const std::array<double, 8> values{100, 0, 0, 1e6, 2e6, 1, -5, -5};  // a value of a border, and steps
-  const auto fine = refined(growingCells([&](const Index& n) { return values[n[0]]; }), 4);
+  const auto fine = refined(growingCells([&](const NodeIndex& n) { return values[n[0]]; }), 4);
   const NodeArrays nodes = allNodes(*fine, 0);
   for (size_t i = 0; i < values.size(); ++i) {
     double sum = 0;
@@ -281,23 +283,23 @@ TEST(RefinedSource, PartsOfCellsHaveItsMeanAndNoNewExtremes) {
 }
 
 TEST(RefinedSource, PartsStayAmongTheCellsAround) {
-  const auto valueOf = [](const Index& n) {
+  const auto valueOf = [](const NodeIndex& n) {
     return std::sin(3.0 * static_cast<double>(n[0])) * std::cos(2.0 * static_cast<double>(n[1])) +
            0.5 * static_cast<double>(n[2]);
   };
   const auto fine = refined(growingCells(valueOf), 2);
   const NodeArrays nodes = allNodes(*fine, 0);
   const GridBlock& block = fine->description().blocks[0];
-  const Index cells{8, 3, 4};
+  const NodeIndex cells{8, 3, 4};
   size_t differ = 0;
-  forEachIndex(block, [&](const Index& n) {
+  forEachIndex(block, [&](const NodeIndex& n) {
     if (n[0] + 1 == block.ni || n[1] + 1 == block.nj || n[2] + 1 == block.nk) return;
-    const Index cell{n[0] / 2, n[1] / 2, n[2] / 2};
+    const NodeIndex cell{n[0] / 2, n[1] / 2, n[2] / 2};
     double least = valueOf(cell), most = least;
     for (size_t axis = 0; axis < 3; ++axis)
       for (const uint64_t beside :
            {cell[axis] - std::min<uint64_t>(cell[axis], 1), std::min(cell[axis] + 1, cells[axis] - 1)}) {
-        Index other = cell;
+        NodeIndex other = cell;
         other[axis] = beside;
         least = std::min(least, valueOf(other));
         most = std::max(most, valueOf(other));
@@ -312,12 +314,12 @@ TEST(RefinedSource, PartsStayAmongTheCellsAround) {
 
 TEST(RefinedSource, PartsOfPositiveCellsArePositive) {
   // Along each axis alone all parts are; the changes along three add up.
-  const auto valueOf = [](const Index& n) { return std::pow(2.5, n[0] + n[1] + n[2]); };
+  const auto valueOf = [](const NodeIndex& n) { return std::pow(2.5, n[0] + n[1] + n[2]); };
   const auto fine = refined(growingCells(valueOf), 4);
   const NodeArrays nodes = allNodes(*fine, 0);
   const GridBlock& block = fine->description().blocks[0];
   double of_cell = 0;
-  forEachIndex(block, [&](const Index& n) {
+  forEachIndex(block, [&](const NodeIndex& n) {
     if (n[0] + 1 == block.ni || n[1] + 1 == block.nj || n[2] + 1 == block.nk) return;
     const float value = nodes.scalars[0][atOf(block, n)];
     EXPECT_GE(value, 0) << n[0] << ' ' << n[1] << ' ' << n[2];
@@ -328,7 +330,7 @@ TEST(RefinedSource, PartsOfPositiveCellsArePositive) {
 
 TEST(RefinedSource, PartsOfCellsLeaveOutWhatHasNoValue) {
   // Beside a cell without a value and one that is infinite, as at a border: their own values.
-  const auto fine = refined(growingCells([&](const Index& n) {
+  const auto fine = refined(growingCells([&](const NodeIndex& n) {
                               if (n[0] == 4) return static_cast<double>(kNone);
                               return n[0] == 0 ? std::numeric_limits<double>::infinity() : middleOf(n[0]);
                             }),
@@ -350,7 +352,7 @@ std::vector<std::array<double, 3>> sortedPlane(const GridSource& grid, uint32_t 
   const GridBlock& block = grid.description().blocks[number];
   const NodeArrays nodes = allNodes(grid, number);
   std::vector<std::array<double, 3>> positions;
-  forEachIndex(block, [&](const Index& n) {
+  forEachIndex(block, [&](const NodeIndex& n) {
     if (n[axis] != plane) return;
     const glm::dvec3 at = positionOf(nodes, atOf(block, n));
     positions.push_back({at.x, at.y, at.z});
@@ -407,7 +409,7 @@ TEST(RefinedSource, CollapsedFacesStayCollapsed) {
                 parts);
     const GridBlock& block = fine->description().blocks[0];
     const NodeArrays nodes = allNodes(*fine, 0);
-    forEachIndex(block, [&](const Index& n) {
+    forEachIndex(block, [&](const NodeIndex& n) {
       const glm::dvec3 found = positionOf(nodes, atOf(block, n));
       if (n[2] == 0) {
         EXPECT_EQ(found, positionOf(nodes, 0));
@@ -470,8 +472,8 @@ TEST(RefinedSource, FringeAndBoundariesAreThoseOfTheGrid) {
   uint64_t most = 0;
   const auto fine = refined(std::make_unique<CountingSource>(most), 3);
   const GridBoundary& boundary = fine->description().boundaries.at(0);
-  EXPECT_EQ(boundary.first, (Index{0, 9, 6}));
-  EXPECT_EQ(boundary.last, (Index{24, 9, 15}));
+  EXPECT_EQ(boundary.first, (NodeIndex{0, 9, 6}));
+  EXPECT_EQ(boundary.last, (NodeIndex{24, 9, 15}));
   std::vector<uint8_t> fringe;
   ASSERT_TRUE(fine->readFringe(0, {3, 5, 2, 7}, fringe));
   ASSERT_EQ(fringe.size(), 25u * 2 * 5);
@@ -489,7 +491,8 @@ TEST(RefinedSource, FringeAndBoundariesAreThoseOfTheGrid) {
 }
 
 TEST(RefinedSource, SaysWhenThereAreTooManyNodes) {
-  for (const Index& counts : {Index{uint64_t{1} << 61, 1, 1}, Index{uint64_t{1} << 21, 1 << 20, 1 << 20}}) {
+  for (const NodeIndex& counts :
+       {NodeIndex{uint64_t{1} << 61, 1, 1}, NodeIndex{uint64_t{1} << 21, 1 << 20, 1 << 20}}) {
     auto grid = std::make_unique<FunctionGridSource>(std::vector{gridBlock(counts[0], counts[1], counts[2])},
                                                      0, [](const GridNode&) { return NodeValues{}; });
     EXPECT_THROW(refined(std::move(grid), 16), Error);

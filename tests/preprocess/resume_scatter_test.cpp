@@ -26,9 +26,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Stops the job at a write. Nothing is synced, which would take most of the time.
-class StoppingSystemCalls : public SystemCalls {
+class UnsyncedStoppingCalls : public SystemCalls {
  public:
-  StoppingSystemCalls(Progress& progress, int64_t stop_at) : progress_(progress), stop_at_(stop_at) {}
+  UnsyncedStoppingCalls(Progress& progress, int64_t stop_at) : progress_(progress), stop_at_(stop_at) {}
   int fsync(int) override { return 0; }
   ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset) override {
     if (writes++ == stop_at_) progress_.stop(SIGINT);
@@ -75,7 +75,7 @@ class ResumeScatter : public ::testing::Test {
 
   ConvertReport finish(const GridSource& source) const {
     Progress progress;
-    StoppingSystemCalls unsynced(progress, -1);
+    UnsyncedStoppingCalls unsynced(progress, -1);
     const ScopedSystemCalls scope(unsynced);
     return convert(source, options(true), progress);
   }
@@ -83,7 +83,7 @@ class ResumeScatter : public ::testing::Test {
   /// Interrupts a conversion at a write. Whether it was, and had noted some of the splats.
   bool interruptedInScatter(const GridSource& source, int64_t at, bool resume = false) const {
     Progress progress;
-    StoppingSystemCalls calls(progress, at);
+    UnsyncedStoppingCalls calls(progress, at);
     const ScopedSystemCalls scope(calls);
     EXPECT_THROW(convert(source, options(resume), progress), Interrupted);
     const auto journal = readJournal(partial());
@@ -100,7 +100,7 @@ class ResumeScatter : public ::testing::Test {
   /// Makes the expected files, and counts the writes.
   int64_t convertWhole(const GridSource& source) {
     Progress progress;
-    StoppingSystemCalls calls(progress, -1);
+    UnsyncedStoppingCalls calls(progress, -1);
     const ScopedSystemCalls scope(calls);
     whole_ = convert(source, options(false), progress);
     expected_ = allFilesOf(output_);

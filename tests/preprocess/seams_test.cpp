@@ -29,19 +29,19 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kSize = 7;  // of a record: its three numbers, the position, the spacing
+constexpr size_t kSweptDoubles = 7;  // of a record: its three numbers, the position, the spacing
 
 class CoincidenceRanges : public testing::Test {
  protected:
   /// Ranges of these nodes, which are expected to be all, and to part none that coincide.
   std::vector<SweepRange> rangesOf(const std::vector<SweptNode>& nodes) const {
-    RecordSorter sorter(kSize, 1 << 20, folder_.path());
+    RecordSorter sorter(kSweptDoubles, 1 << 20, folder_.path());
     LargestReach reach;
     for (size_t n = 0; n < nodes.size(); ++n) {
       const auto& [sweep, position, spacing] = nodes[n];
-      const std::array<double, kSize> record{sweep.along, sweep.across, std::bit_cast<double>(uint64_t{n}),
-                                             position.x,  position.y,   position.z,
-                                             spacing};
+      const std::array<double, kSweptDoubles> record{
+          sweep.along, sweep.across, std::bit_cast<double>(uint64_t{n}), position.x, position.y,
+          position.z,  spacing};
       sorter.add(record);
       reach.add(position, spacing);
     }
@@ -122,8 +122,8 @@ MappedBlock affineBlock(std::array<uint64_t, 3> first, std::array<uint64_t, 3> c
   return block;
 }
 
-void expectSame(const std::map<std::array<long, 3>, Piece>& found,
-                const std::map<std::array<long, 3>, Piece>& expected) {
+void expectSameMerged(const std::map<std::array<long, 3>, Piece>& found,
+                      const std::map<std::array<long, 3>, Piece>& expected) {
   ASSERT_EQ(found.size(), expected.size());
   for (const auto& [place, whole] : expected) {
     const auto at = found.find(place);
@@ -162,9 +162,9 @@ TEST_F(Seams, OfTwoBlocksVanish) {
   const Places cut =
       mergeBlocks({affineBlock({0, 0, 0}, {4, 5, 6}, 0), affineBlock({3, 0, 0}, {6, 5, 6}, 4 * 5 * 6)});
   EXPECT_EQ(merged_, 30u);
-  expectSame(cut, whole);
+  expectSameMerged(cut, whole);
   memory_bytes_ = 10000;  // some fifty splats: in runs on disk, and those that wait for probes as well
-  expectSame(
+  expectSameMerged(
       mergeBlocks({affineBlock({3, 0, 0}, {6, 5, 6}, 4 * 5 * 6), affineBlock({0, 0, 0}, {4, 5, 6}, 0)}),
       whole);
 }
@@ -206,7 +206,7 @@ TEST_F(Seams, OfEightBlocksVanishAtTheirCommonCornerToo) {
   }
   const Places cut = mergeBlocks(blocks);
   EXPECT_EQ(merged_, 9u * 9 * 9 - 8 * 8 * 8);
-  expectSame(cut, mergeBlocks({affineBlock({0, 0, 0}, {8, 8, 8}, 0)}));
+  expectSameMerged(cut, mergeBlocks({affineBlock({0, 0, 0}, {8, 8, 8}, 0)}));
   // The corner's node is the lowest of the eight.
   const glm::dvec3 corner = affineBlock({3, 3, 3}, {1, 1, 1}, 0).splats().splats[0].node_position * 1024.0;
   const Piece& piece = cut.at({std::lround(corner.x), std::lround(corner.y), std::lround(corner.z)});
@@ -233,7 +233,7 @@ TEST_F(Seams, AcrossAWallLayerAreAlikeIfTheirCellsAre) {
 
 /// A pipe whose wall layer begins at radius 1 with `spacing`, closed along i after 128 steps. In float
 /// arithmetic, as a grid generator would.
-MappedBlock pipe(float spacing) {
+MappedBlock closedPipe(float spacing) {
   MappedBlock block(129, 7, 5, [&](double i, double j, double k) {
     const float theta = static_cast<float>(i) * (6.2831853f / 128.0f);
     const float r = 1.0f + spacing * static_cast<float>(j);
@@ -244,7 +244,7 @@ MappedBlock pipe(float spacing) {
 }
 
 TEST_F(Seams, OfAPeriodicAxisCloseThoughRoundedDifferently) {
-  const MappedBlock block = pipe(0.1f);
+  const MappedBlock block = closedPipe(0.1f);
   ASSERT_NE(block.nodes.y[block.at(0, 2, 2)], block.nodes.y[block.at(128, 2, 2)]);
   const std::vector<Piece> out = merge(facesOf(block), 64 << 20, 4);
   EXPECT_EQ(merged_, 7u * 5u);
@@ -322,7 +322,7 @@ TEST_F(Seams, OfAClosedRowEndAtItsFirstAndLastLayerAlone) {
 
 TEST_F(Seams, DoNotJoinTheNodesOfAWallLayer) {
   // Eight units in the last place apart: still the seam's 35 pairs and no others.
-  merge(facesOf(pipe(1e-6f)), 64 << 20, 4);
+  merge(facesOf(closedPipe(1e-6f)), 64 << 20, 4);
   EXPECT_EQ(merged_, 7u * 5u);
   // In double precision, far below any float's rounding.
   MappedBlock thin(5, 9, 5, [](double i, double j, double k) { return glm::dvec3(100 + i, 1e-10 * j, k); });

@@ -62,12 +62,12 @@ NodeArrays ordinaryNodes(size_t count, size_t scalars) {
   return nodes;
 }
 
-const NodeBox kAll{0, 1, 0, 1};
+const NodeBox kAllNodes{0, 1, 0, 1};
 
 TEST(NodeReader, LeavesOrdinaryNodesThere) {
   const GivenNodes source(ordinaryNodes(10'001, 2));
   NodeArrays out;
-  const BlankCounts counts = NodeReader(source, {0, 1}, 7.0).read(0, kAll, out);
+  const BlankCounts counts = NodeReader(source, {0, 1}, 7.0).read(0, kAllNodes, out);
   EXPECT_EQ(counts.total(), 0u);
   EXPECT_EQ(std::count(out.blank.begin(), out.blank.end(), 0), 10'001);
 }
@@ -99,7 +99,7 @@ TEST(NodeReader, BlanksEveryNodeThatIsNotThere) {
   }
   const GivenNodes source(nodes);
   NodeArrays out;
-  const BlankCounts counts = NodeReader(source, {0, 1}, -9999.0).read(0, kAll, out);
+  const BlankCounts counts = NodeReader(source, {0, 1}, -9999.0).read(0, kAllNodes, out);
   EXPECT_EQ(out.blank, blank);
   EXPECT_EQ(counts.by_grid, expected.by_grid);
   EXPECT_EQ(counts.by_value, expected.by_value);
@@ -119,7 +119,7 @@ TEST(NodeReader, FindsASingleBadNodeAnywhere) {
         if (where == 4) nodes.scalars[0][bad] = 5.5f;
         const GivenNodes source(nodes);
         NodeArrays out;
-        const BlankCounts counts = NodeReader(source, {0}, 5.5).read(0, kAll, out);
+        const BlankCounts counts = NodeReader(source, {0}, 5.5).read(0, kAllNodes, out);
         ASSERT_EQ(counts.by_value, where == 4);
         ASSERT_EQ(counts.not_finite, where != 4);
         ASSERT_EQ(out.blank[bad], 1) << bad << " of " << count;
@@ -134,12 +134,12 @@ TEST(NodeReader, LooksOnlyAtTheScalarsAskedFor) {
   nodes.scalars[1][8] = 5.5f;
   const GivenNodes source(nodes);
   NodeArrays out;
-  EXPECT_EQ(NodeReader(source, {0}, 5.5).read(0, kAll, out).total(), 0u);
-  const BlankCounts counts = NodeReader(source, {1}, 5.5).read(0, kAll, out);
+  EXPECT_EQ(NodeReader(source, {0}, 5.5).read(0, kAllNodes, out).total(), 0u);
+  const BlankCounts counts = NodeReader(source, {1}, 5.5).read(0, kAllNodes, out);
   EXPECT_EQ(counts.not_finite, 1u);
   EXPECT_EQ(counts.by_value, 1u);
   EXPECT_TRUE(out.blank[7] && out.blank[8]);
-  EXPECT_EQ(NodeReader(source, {}, 5.5).read(0, kAll, out).total(), 0u);
+  EXPECT_EQ(NodeReader(source, {}, 5.5).read(0, kAllNodes, out).total(), 0u);
 }
 
 /// A value to blank is compared as the scalars are stored: -999.9 is no float.
@@ -148,7 +148,7 @@ TEST(NodeReader, ComparesInSinglePrecision) {
   nodes.scalars[0][3] = -999.9f;
   const GivenNodes source(nodes);
   NodeArrays out;
-  EXPECT_EQ(NodeReader(source, {0}, -999.9).read(0, kAll, out).by_value, 1u);
+  EXPECT_EQ(NodeReader(source, {0}, -999.9).read(0, kAllNodes, out).by_value, 1u);
 }
 
 bool says(const std::string& text, const std::string& part) {

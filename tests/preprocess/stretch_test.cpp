@@ -40,7 +40,7 @@ struct Exact {
 };
 
 /// The definition, by logarithms.
-Exact defined(const std::array<double, 5>& extents, StretchFit fit = StretchFit::kSteep) {
+Exact definedStretch(const std::array<double, 5>& extents, StretchFit fit = StretchFit::kSteep) {
   const auto l = [&](size_t n) { return std::log(extents[n] / extents[2]); };
   const double curve = l(1) + l(3), far_curve = l(0) + l(4), slope = l(3) - l(1);
   const double bend = l(4) - l(0) - 2 * slope;
@@ -71,7 +71,7 @@ TEST(Stretch, IsAsItIsDefined) {
           1e-5 * std::exp(log_extent(random) * (n % 2 == 0 ? 0.8 : 0.1) + steady * static_cast<double>(m));
     for (const StretchFit fit : {StretchFit::kGentle, StretchFit::kSteep}) {
       const Stretch found = ofExtents(extents, fit);
-      const Exact exact = defined(extents, fit);
+      const Exact exact = definedStretch(extents, fit);
       EXPECT_NEAR(found.factor, exact.factor, found.factor == 1 ? 3e-4 : 3e-6);
       EXPECT_NEAR(found.growth, exact.growth, 3e-6);
       EXPECT_NEAR(found.drift, exact.drift, 3e-6);
@@ -200,8 +200,8 @@ TEST(Stretch, OfSpectralElementsIsTheSameWhereALineEndsBetweenTwo) {
   const Line whole = Line::ofSteps(whole_steps), half = Line::ofSteps({1, 1.6, 1, 1, 1.6, 1});
   for (size_t n = 0; n < half.x.size(); ++n) EXPECT_EQ(half.stretch(n), whole.stretch(n + 6)) << n;
   // Extents are 1, 1.3, 1.3 again and again.
-  EXPECT_NEAR(whole.stretch(6), defined({1.3, 1.3, 1, 1.3, 1.3}).factor, 3e-6);
-  EXPECT_NEAR(whole.stretch(7), defined({1.3, 1, 1.3, 1.3, 1}).factor, 3e-6);
+  EXPECT_NEAR(whole.stretch(6), definedStretch({1.3, 1.3, 1, 1.3, 1.3}).factor, 3e-6);
+  EXPECT_NEAR(whole.stretch(7), definedStretch({1.3, 1, 1.3, 1.3, 1}).factor, 3e-6);
   EXPECT_GT(whole.stretch(6), 1.05);
 }
 

@@ -34,7 +34,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kNi = 49, kNj = 13, kNk = 6;
+constexpr uint64_t kStreamwise = 49, kWallNormal = 13, kSpanwise = 6;
 constexpr uint64_t kNose = 24, kPlate = 12;  // i of the leading edge; nodes from there to the trailing edge
 
 /// Parabolic coordinates, in which the plate from x = 0 to 1 and the wake behind it are both eta = 0.
@@ -59,17 +59,18 @@ double temperature(const glm::dvec3& at) {
 /// "s0" is the temperature, the same on both sides, "s1" the pressure, "s2" twice that plus the temperature. `strength`: of
 /// the pressure.
 FunctionGridSource plate(double strength = 1) {
-  return FunctionGridSource({gridBlock(kNi, kNj, kNk)}, 3, [strength](const GridNode& n) {
-    const glm::dvec3 at = placeAt(n);
-    const double p = strength * pressure(xiOf(n)), t = temperature(at);
-    return NodeValues{at, {static_cast<float>(t), static_cast<float>(p), static_cast<float>(2 * p + t)}};
-  });
+  return FunctionGridSource(
+      {gridBlock(kStreamwise, kWallNormal, kSpanwise)}, 3, [strength](const GridNode& n) {
+        const glm::dvec3 at = placeAt(n);
+        const double p = strength * pressure(xiOf(n)), t = temperature(at);
+        return NodeValues{at, {static_cast<float>(t), static_cast<float>(p), static_cast<float>(2 * p + t)}};
+      });
 }
 
 /// Makes the same plate of two blocks that meet at it and at the wake.
 FunctionGridSource plateOfTwoBlocks() {
   return FunctionGridSource(
-      std::vector<GridBlock>(2, gridBlock(kNose + 1, kNj, kNk)), 2, [](const GridNode& n) {
+      std::vector<GridBlock>(2, gridBlock(kNose + 1, kWallNormal, kSpanwise)), 2, [](const GridNode& n) {
         const GridNode of_whole{0, n.i + n.block * kNose, n.j, n.k};
         const glm::dvec3 at = placeAt(of_whole);
         return NodeValues{
@@ -135,12 +136,12 @@ class ThinWallsTest : public testing::Test {
 
 TEST_F(ThinWallsTest, BothSidesOfAPlateHaveTheirOwnValues) {
   const ConvertReport report = convertTo("a.splats", plate(), {1});
-  EXPECT_EQ(report.merged_nodes, kWakePairs * kNk);
+  EXPECT_EQ(report.merged_nodes, kWakePairs * kSpanwise);
   ASSERT_EQ(report.notes.size(), 1u);
   expectSays(report.notes[0], "66 pairs of nodes on both sides of thin walls stay apart");
   const auto splats = splatsOf("a.splats");
-  EXPECT_EQ(splats.size(), (kNi * kNj - kWakePairs) * kNk);
-  for (uint64_t k = 0; k < kNk; ++k)
+  EXPECT_EQ(splats.size(), (kStreamwise * kWallNormal - kWakePairs) * kSpanwise);
+  for (uint64_t k = 0; k < kSpanwise; ++k)
     for (uint64_t s = 1; s <= kNose; ++s) {
       const auto lower = splats.find({0, kNose - s, 0, k}), upper = splats.find({0, kNose + s, 0, k});
       ASSERT_NE(lower, splats.end());
@@ -159,11 +160,11 @@ TEST_F(ThinWallsTest, BothSidesOfAPlateHaveTheirOwnValues) {
 TEST_F(ThinWallsTest, VolumesAreThoseOfTheGridAndItsField) {
   convertTo("a.splats", plate(), {1});
   const auto splats = splatsOf("a.splats");
-  constexpr double kThickness = 0.25 * (kNk - 1), kAbove = 0.3;
+  constexpr double kThickness = 0.25 * (kSpanwise - 1), kAbove = 0.3;
   constexpr int kParts = 16;
   double volume = 0, above = 0;
-  for (uint64_t j = 0; j + 1 < kNj; ++j)
-    for (uint64_t i = 0; i + 1 < kNi; ++i) {
+  for (uint64_t j = 0; j + 1 < kWallNormal; ++j)
+    for (uint64_t i = 0; i + 1 < kStreamwise; ++i) {
       const glm::dvec3 a = placeAt({0, i, j, 0}), b = placeAt({0, i + 1, j, 0}),
                        c = placeAt({0, i + 1, j + 1, 0}), d = placeAt({0, i, j + 1, 0});
       const double area = 0.5 * std::abs(glm::cross(c - a, d - b).z);
@@ -189,38 +190,39 @@ TEST_F(ThinWallsTest, TheGeometryIsThatOfAllScalarsOfTheFile) {
 
 /// Solvers differ a little on the two sides of a cut.
 TEST_F(ThinWallsTest, SmallDifferencesAreThoseOfACut) {
-  const FunctionGridSource noisy({gridBlock(kNi, kNj, kNk)}, 1, [](const GridNode& n) {
+  const FunctionGridSource noisy({gridBlock(kStreamwise, kWallNormal, kSpanwise)}, 1, [](const GridNode& n) {
     const glm::dvec3 at = placeAt(n);
     return NodeValues{at, {static_cast<float>(at.x + 0.005 * pressure(xiOf(n)))}};
   });
-  EXPECT_EQ(convertTo("a.splats", noisy, {0}).merged_nodes, kNose * kNk);
+  EXPECT_EQ(convertTo("a.splats", noisy, {0}).merged_nodes, kNose * kSpanwise);
 }
 
 /// A scalar whose range is that of a few nodes, 10,000 times as wide as its values elsewhere.
 TEST_F(ThinWallsTest, LongTailsHideNoWalls) {
   const auto tail = [](double noise) {
-    return FunctionGridSource({gridBlock(kNi, kNj, kNk)}, 1, [noise](const GridNode& n) {
-      const bool is_nose = n.i == kNose && n.j == 0 && n.k == 0;
-      const double wake = n.i > kNose + kPlate ? noise : 0;
-      return NodeValues{placeAt(n), {static_cast<float>(is_nose ? 1e3 : pressure(xiOf(n)) + wake)}};
-    });
+    return FunctionGridSource(
+        {gridBlock(kStreamwise, kWallNormal, kSpanwise)}, 1, [noise](const GridNode& n) {
+          const bool is_nose = n.i == kNose && n.j == 0 && n.k == 0;
+          const double wake = n.i > kNose + kPlate ? noise : 0;
+          return NodeValues{placeAt(n), {static_cast<float>(is_nose ? 1e3 : pressure(xiOf(n)) + wake)}};
+        });
   };
   // The noise of the wake is a hundredth of the values' spread, and less than 1e-4 of their range.
-  EXPECT_EQ(convertTo("a.splats", tail(0.01), {0}).merged_nodes, kWakePairs * kNk);
+  EXPECT_EQ(convertTo("a.splats", tail(0.01), {0}).merged_nodes, kWakePairs * kSpanwise);
 }
 
 TEST_F(ThinWallsTest, BlocksThatMeetAtAPlateStayApartThere) {
   const ConvertReport one = convertTo("a.splats", plate(), {1}),
                       two = convertTo("b.splats", plateOfTwoBlocks(), {1});
   // The blocks also share the nodes before the leading edge.
-  EXPECT_EQ(two.merged_nodes, one.merged_nodes + kNj * kNk);
+  EXPECT_EQ(two.merged_nodes, one.merged_nodes + kWallNormal * kSpanwise);
   EXPECT_NEAR(volumeOf(splatsOf("b.splats"), 0.3), volumeOf(splatsOf("a.splats"), 0.3), 1e-3);
 }
 
 /// Numbers of blocks or processes differ at every joint, and tell nothing of walls.
 TEST_F(ThinWallsTest, NumbersOfBlocksAreNoWalls) {
   const FunctionGridSource numbered(
-      std::vector<GridBlock>(2, gridBlock(kNose + 1, kNj, kNk)), 2, [](const GridNode& n) {
+      std::vector<GridBlock>(2, gridBlock(kNose + 1, kWallNormal, kSpanwise)), 2, [](const GridNode& n) {
         const glm::dvec3 at = placeAt({0, n.i + n.block * kNose, n.j, n.k});
         return NodeValues{at, {static_cast<float>(temperature(at)), static_cast<float>(7 + n.block)}};
       });
@@ -229,13 +231,14 @@ TEST_F(ThinWallsTest, NumbersOfBlocksAreNoWalls) {
 
 /// The value of --blank is none of a wall, and hides none.
 TEST_F(ThinWallsTest, BlankValuesHideNoWalls) {
-  const FunctionGridSource blanked({gridBlock(kNi, kNj, kNk)}, 1, [](const GridNode& n) {
-    const bool is_blank = n.j == kNj - 1;
-    return NodeValues{placeAt(n), {is_blank ? -1e30F : static_cast<float>(pressure(xiOf(n)))}};
-  });
+  const FunctionGridSource blanked(
+      {gridBlock(kStreamwise, kWallNormal, kSpanwise)}, 1, [](const GridNode& n) {
+        const bool is_blank = n.j == kWallNormal - 1;
+        return NodeValues{placeAt(n), {is_blank ? -1e30F : static_cast<float>(pressure(xiOf(n)))}};
+      });
   ConvertOptions of_blank = options("a.splats", {0});
   of_blank.blank_value = -1e30;
-  EXPECT_EQ(converted(blanked, of_blank).merged_nodes, kWakePairs * kNk);
+  EXPECT_EQ(converted(blanked, of_blank).merged_nodes, kWakePairs * kSpanwise);
 }
 
 TEST_F(ThinWallsTest, BytesDependOnTheGridAlone) {
@@ -243,7 +246,7 @@ TEST_F(ThinWallsTest, BytesDependOnTheGridAlone) {
   const ConvertReport report = expectSameCaches(
       grid, options("a.splats", {1}),
       {{.threads = 1}, {.memory_bytes = leastMemory(1)}, {.slab_bytes = 20000}, {.ranks = 3}});
-  EXPECT_EQ(report.merged_nodes, kWakePairs * kNk);
+  EXPECT_EQ(report.merged_nodes, kWakePairs * kSpanwise);
 }
 
 TEST_F(ThinWallsTest, AddedScalarsAreThoseOfAConversionOfAll) {
@@ -282,7 +285,8 @@ TEST_F(ThinWallsTest, ADamagedListIsNamed) {
   overwriteFile(path, whole);
   EXPECT_TRUE(verifyCache(CacheReader(folder_ / "a.splats")).findings.empty());
   // A malicious one has its checksum, and the whole block again and again, each row of which takes memory.
-  const std::vector<WallSide> boxes(20, WallSide{0, 1, {0, 0, 0}, {kNi - 1, kNj - 1, kNk - 1}});
+  const std::vector<WallSide> boxes(
+      20, WallSide{0, 1, {0, 0, 0}, {kStreamwise - 1, kWallNormal - 1, kSpanwise - 1}});
   const auto listed = std::as_bytes(std::span(boxes));
   const Manifest manifest = CacheReader(folder_ / "a.splats").manifest();
   Manifest malicious = manifest;
@@ -318,7 +322,7 @@ TEST_F(ThinWallsTest, TheListHasBoxesOfTheUpperSide) {
   convertTo("a.splats", plate(), {1});
   const Manifest manifest = CacheReader(folder_ / "a.splats").manifest();
   EXPECT_TRUE(manifest.hasFeature(kThinWalls));
-  const WallSide upper{0, 1, {kNose + 1, 0, 0}, {kNose + kPlatePairs, 0, kNk - 1}};
+  const WallSide upper{0, 1, {kNose + 1, 0, 0}, {kNose + kPlatePairs, 0, kSpanwise - 1}};
   const std::string bytes = bytesOfFile(folder_ / "a.splats/walls.bin");
   ASSERT_EQ(bytes.size(), sizeof(WallSide));
   EXPECT_EQ(std::memcmp(bytes.data(), &upper, sizeof upper), 0);

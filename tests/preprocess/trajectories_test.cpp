@@ -17,9 +17,9 @@
 namespace curvisplat {
 namespace {
 
-using Index = std::vector<size_t>;
-constexpr auto kDouble = NetcdfNumbers::kDoublePrecision;
-constexpr double kFill = -9999;
+using ElementIndex = std::vector<size_t>;
+constexpr auto kDoubleNumbers = NetcdfNumbers::kDoublePrecision;
+constexpr double kFillNumber = -9999;
 
 /// Line n has n + 2 places.
 constexpr std::array<size_t, 3> kLengths{2, 3, 4};
@@ -48,13 +48,14 @@ using OfPlace = std::function<double(size_t line, size_t n)>;
 /// The four variables of each observation; `placed` gives a function of the file's indices.
 void addVariables(NetcdfWriter& file, const std::vector<std::string>& dims,
                   const std::function<NetcdfFunction(const OfPlace&)>& placed) {
-  const NetcdfDoubleList fill{{kFill}};
-  file.variable("time", kDouble, dims, {{"units", "hours since 2001-01-01"}, {"_FillValue", fill}},
+  const NetcdfDoubleList fill{{kFillNumber}};
+  file.variable("time", kDoubleNumbers, dims, {{"units", "hours since 2001-01-01"}, {"_FillValue", fill}},
                 placed(timeOf));
-  file.variable("lon", kDouble, dims, {{"units", "degrees_east"}, {"_FillValue", fill}}, placed(longitudeOf));
-  file.variable("lat", kDouble, dims, {{"units", "degrees_north"}, {"_FillValue", fill}},
+  file.variable("lon", kDoubleNumbers, dims, {{"units", "degrees_east"}, {"_FillValue", fill}},
+                placed(longitudeOf));
+  file.variable("lat", kDoubleNumbers, dims, {{"units", "degrees_north"}, {"_FillValue", fill}},
                 placed([](size_t line, size_t) { return 5.0 * static_cast<double>(line); }));
-  file.variable("z", kDouble, dims,
+  file.variable("z", kDoubleNumbers, dims,
                 {{"standard_name", "depth"}, {"units", "m"}, {"positive", "down"}, {"_FillValue", fill}},
                 placed(depthOf));
 }
@@ -95,14 +96,14 @@ TEST_P(Trajectories, OfIncompleteArrays) {
       NetcdfWriter file(path_, GetParam());
       file.dimension("trajectory", kLengths.size());
       file.dimension("obs", kLongest);
-      file.variable("trajectory", kDouble, {"trajectory"}, {{"cf_role", "trajectory_id"}},
-                    [](const Index& n) { return static_cast<double>(n[0]); });
+      file.variable("trajectory", kDoubleNumbers, {"trajectory"}, {{"cf_role", "trajectory_id"}},
+                    [](const ElementIndex& n) { return static_cast<double>(n[0]); });
       const std::vector<std::string> dims = lines_first ? std::vector<std::string>{"trajectory", "obs"}
                                                         : std::vector<std::string>{"obs", "trajectory"};
       addVariables(file, dims, [&](const OfPlace& of) {
-        return [&, of](const Index& index) {
+        return [&, of](const ElementIndex& index) {
           const size_t line = index[lines_first ? 0 : 1], n = index[lines_first ? 1 : 0];
-          return n < kLengths[line] ? of(line, n) : kFill;
+          return n < kLengths[line] ? of(line, n) : kFillNumber;
         };
       });
     }
@@ -117,22 +118,22 @@ TEST_P(Trajectories, OfOneTimeForAll) {
     NetcdfWriter file(path_, GetParam());
     file.dimension("trajectory", 2);
     file.dimension("time", 4);
-    file.variable("time", kDouble, {"time"}, {{"units", "seconds since 2001-01-01"}},
-                  [](const Index& n) { return 3600.0 * static_cast<double>(n[0]); });
-    const NetcdfDoubleList fill{{kFill}};
+    file.variable("time", kDoubleNumbers, {"time"}, {{"units", "seconds since 2001-01-01"}},
+                  [](const ElementIndex& n) { return 3600.0 * static_cast<double>(n[0]); });
+    const NetcdfDoubleList fill{{kFillNumber}};
     const auto where = [](double missing_at) {
-      return [=](const Index& n) {
+      return [=](const ElementIndex& n) {
         const bool missing = n[0] == 0 ? n[1] == 0 : static_cast<double>(n[1]) == missing_at;
-        return missing ? kFill : static_cast<double>(10 * n[0] + n[1]);
+        return missing ? kFillNumber : static_cast<double>(10 * n[0] + n[1]);
       };
     };
-    file.variable("lon", kDouble, {"trajectory", "time"},
+    file.variable("lon", kDoubleNumbers, {"trajectory", "time"},
                   {{"standard_name", "longitude"}, {"_FillValue", fill}}, where(2));
-    file.variable("lat", kDouble, {"trajectory", "time"},
+    file.variable("lat", kDoubleNumbers, {"trajectory", "time"},
                   {{"standard_name", "latitude"}, {"_FillValue", fill}}, where(2));
-    file.variable("z", kDouble, {"trajectory", "time"},
+    file.variable("z", kDoubleNumbers, {"trajectory", "time"},
                   {{"standard_name", "z"}, {"units", "m"}, {"positive", "up"}},
-                  [](const Index&) { return -20.0; });
+                  [](const ElementIndex&) { return -20.0; });
   }
   const CfTrajectories read = readCfTrajectories(path_, "");
   EXPECT_EQ(read.begins, (std::vector<uint32_t>{0, 3, 5, 6})) << "a gap ends a line";
@@ -146,11 +147,11 @@ TEST_P(Trajectories, OfContiguousRaggedArrays) {
     file.dimension("drifter", kLengths.size());
     file.dimension("obs", kPlaces);
     file.variable("rowsize", NetcdfNumbers::kInt32, {"drifter"}, {{"sample_dimension", "obs"}},
-                  [](const Index& n) { return static_cast<double>(kLengths[n[0]]); });
-    file.variable("mass", kDouble, {"drifter"}, {},
-                  [](const Index& n) { return 1.5 * static_cast<double>(n[0]); });
+                  [](const ElementIndex& n) { return static_cast<double>(kLengths[n[0]]); });
+    file.variable("mass", kDoubleNumbers, {"drifter"}, {},
+                  [](const ElementIndex& n) { return 1.5 * static_cast<double>(n[0]); });
     addVariables(file, {"obs"}, [](const OfPlace& of) {
-      return [of](const Index& index) {
+      return [of](const ElementIndex& index) {
         const auto [line, n] = observations()[index[0]];
         return of(line, n);
       };
@@ -169,13 +170,16 @@ TEST_P(Trajectories, MayHaveOneDepthEach) {
       NetcdfWriter file(path_, GetParam());
       file.dimension("drifter", lines);
       file.dimension("obs", kPlaces);
-      file.variable(
-          "rowsize", NetcdfNumbers::kInt32, {"drifter"}, {{"sample_dimension", "obs"}},
-          [](const Index& n) { return n[0] < kLengths.size() ? static_cast<double>(kLengths[n[0]]) : 0; });
-      file.variable("lon", kDouble, {"obs"}, {{"units", "degrees_east"}}, [](const Index&) { return 1.0; });
-      file.variable("lat", kDouble, {"obs"}, {{"units", "degrees_north"}}, [](const Index&) { return 1.0; });
-      file.variable("z", kDouble, {"drifter"}, {{"units", "m"}, {"positive", "down"}},
-                    [](const Index& n) { return depthOf(n[0], 0); });
+      file.variable("rowsize", NetcdfNumbers::kInt32, {"drifter"}, {{"sample_dimension", "obs"}},
+                    [](const ElementIndex& n) {
+                      return n[0] < kLengths.size() ? static_cast<double>(kLengths[n[0]]) : 0;
+                    });
+      file.variable("lon", kDoubleNumbers, {"obs"}, {{"units", "degrees_east"}},
+                    [](const ElementIndex&) { return 1.0; });
+      file.variable("lat", kDoubleNumbers, {"obs"}, {{"units", "degrees_north"}},
+                    [](const ElementIndex&) { return 1.0; });
+      file.variable("z", kDoubleNumbers, {"drifter"}, {{"units", "m"}, {"positive", "down"}},
+                    [](const ElementIndex& n) { return depthOf(n[0], 0); });
     }
     const CfTrajectories read = readCfTrajectories(path_, "");
     ASSERT_EQ(read.points.size(), kPlaces);
@@ -195,7 +199,9 @@ TEST_P(Trajectories, OfIndexedRaggedArraysInAnyOrder) {
       std::stable_sort(order.begin(), order.end(),
                        [](const auto& a, const auto& b) { return a.second > b.second; });
       const auto placed = [order](const OfPlace& of) {
-        return [of, order](const Index& index) { return of(order[index[0]].first, order[index[0]].second); };
+        return [of, order](const ElementIndex& index) {
+          return of(order[index[0]].first, order[index[0]].second);
+        };
       };
       addVariables(file, {"obs"}, placed);
       file.variable("number", NetcdfNumbers::kInt32, {"obs"},
@@ -210,7 +216,8 @@ TEST_P(Trajectories, WhatIsNoneIsRefused) {
   {
     NetcdfWriter file(path_, GetParam());
     file.dimension("obs", 2);
-    file.variable("lon", kDouble, {"obs"}, {{"units", "degrees_east"}}, [](const Index&) { return 1.0; });
+    file.variable("lon", kDoubleNumbers, {"obs"}, {{"units", "degrees_east"}},
+                  [](const ElementIndex&) { return 1.0; });
   }
   EXPECT_EQ(
       refusal(),
@@ -220,10 +227,12 @@ TEST_P(Trajectories, WhatIsNoneIsRefused) {
     NetcdfWriter file(path_, GetParam());
     file.dimension("obs", 2);
     file.dimension("drifter", 1);
-    file.variable("rowsize", kDouble, {"drifter"}, {{"sample_dimension", "obs"}},
-                  [](const Index&) { return 3.0; });
-    file.variable("lon", kDouble, {"obs"}, {{"units", "degrees_east"}}, [](const Index&) { return 1.0; });
-    file.variable("lat", kDouble, {"obs"}, {{"units", "degrees_north"}}, [](const Index&) { return 1.0; });
+    file.variable("rowsize", kDoubleNumbers, {"drifter"}, {{"sample_dimension", "obs"}},
+                  [](const ElementIndex&) { return 3.0; });
+    file.variable("lon", kDoubleNumbers, {"obs"}, {{"units", "degrees_east"}},
+                  [](const ElementIndex&) { return 1.0; });
+    file.variable("lat", kDoubleNumbers, {"obs"}, {{"units", "degrees_north"}},
+                  [](const ElementIndex&) { return 1.0; });
   }
   EXPECT_EQ(refusal(), path_.string() + ": rowsize is 3 for a trajectory; expected up to 2 observations");
   std::ofstream(path_) << "none";
@@ -231,14 +240,14 @@ TEST_P(Trajectories, WhatIsNoneIsRefused) {
 }
 
 TEST_P(Trajectories, AlongOneDimensionTwiceAreNone) {
-  const auto number = [](const Index& n) { return static_cast<double>(n[0]); };
+  const auto number = [](const ElementIndex& n) { return static_cast<double>(n[0]); };
   const auto write = [&](const std::vector<std::string>& of_places,
                          const std::vector<std::string>& of_times) {
     NetcdfWriter file(path_, GetParam());
     file.dimension("obs", 3);
-    file.variable("lon", kDouble, of_places, {{"units", "degrees_east"}}, number);
-    file.variable("lat", kDouble, of_places, {{"units", "degrees_north"}}, number);
-    file.variable("time", kDouble, of_times, {{"units", "hours since 2001-01-01"}}, number);
+    file.variable("lon", kDoubleNumbers, of_places, {{"units", "degrees_east"}}, number);
+    file.variable("lat", kDoubleNumbers, of_places, {{"units", "degrees_north"}}, number);
+    file.variable("time", kDoubleNumbers, of_times, {{"units", "hours since 2001-01-01"}}, number);
   };
   write({"obs", "obs"}, {"obs"});
   EXPECT_EQ(

@@ -27,7 +27,7 @@ std::unique_ptr<GridSource> openText(const TestFolder& folder, const std::string
   return openGrid(options);
 }
 
-std::string errorOf(const TestFolder& folder, const std::string& file) {
+std::string encodingError(const TestFolder& folder, const std::string& file) {
   return curvisplat::errorOf([&] { allNodes(*openText(folder, file), 0); });
 }
 
@@ -221,7 +221,7 @@ TEST(VtkEncodings, BlocksLargerThanMemoryAllows) {
                 static_cast<float>(noise[5 * (((60 + k) * 64 + 7) * 64 + n) + 3]));
 
   encoding.compressor = VtsEncoding::Compressor::kLz4;
-  const std::string error = errorOf(folder, vtsFile(grid, encoding));
+  const std::string error = encodingError(folder, vtsFile(grid, encoding));
   expectSays(error, "cannot be read in parts");
 }
 
@@ -231,7 +231,7 @@ TEST(VtkEncodings, UnsupportedEncodingsAreRefusedByName) {
   const auto changed = [&](const std::string& from, const std::string& to) {
     std::string other = file;
     for (size_t at; (at = other.find(from)) != std::string::npos;) other.replace(at, from.size(), to);
-    return errorOf(folder, other);
+    return encodingError(folder, other);
   };
   const std::tuple<const char*, const char*, const char*> cases[] = {
       {"version=\"1.0\" byte", "compressor=\"vtkZstdDataCompressor\" byte",
@@ -299,15 +299,15 @@ TEST(VtkEncodings, TextsMustHaveAsManyNumbersAsTheGrid) {
   ascii.format = VtsEncoding::Format::kAscii;
   VtsGrid grid = annulusVtsGrid(3, 3, 3);
   grid.point_data = {{"a", "Int8", 1, std::vector<double>(27, 5)}};
-  EXPECT_EQ(errorOf(folder, vtsFile(grid, ascii)), "");
+  EXPECT_EQ(encodingError(folder, vtsFile(grid, ascii)), "");
   grid.point_data[0].values[9] = 300;
-  expectSays(errorOf(folder, vtsFile(grid, ascii)), "array a: 300 is not an integer of 8 bits");
+  expectSays(encodingError(folder, vtsFile(grid, ascii)), "array a: 300 is not an integer of 8 bits");
   grid.point_data[0].values.assign(28, 5);
-  expectSays(errorOf(folder, vtsFile(grid, ascii)), "array a has more than 27 numbers");
+  expectSays(encodingError(folder, vtsFile(grid, ascii)), "array a has more than 27 numbers");
   grid.point_data[0].values.assign(26, 5);
-  expectSays(errorOf(folder, vtsFile(grid, ascii)), "array a needs 27 numbers");
+  expectSays(encodingError(folder, vtsFile(grid, ascii)), "array a needs 27 numbers");
   grid.point_data[0].values.assign(26, 55);
-  expectSays(errorOf(folder, vtsFile(grid, ascii)), "array a has 26 numbers; expected 27");
+  expectSays(encodingError(folder, vtsFile(grid, ascii)), "array a has 26 numbers; expected 27");
 }
 
 TEST(VtkEncodings, CharactersThatAreNoBase64AreRefused) {
@@ -316,15 +316,15 @@ TEST(VtkEncodings, CharactersThatAreNoBase64AreRefused) {
   encoding.format = VtsEncoding::Format::kAppendedBase64;
   size_t begin = 0;
   const std::string file = vtsFile(annulusVtsGrid(3, 3, 3), encoding, &begin);
-  EXPECT_EQ(errorOf(folder, file), "");
+  EXPECT_EQ(encodingError(folder, file), "");
   for (const char wrong : {'!', '=', ' ', '\n', '\x80'}) {
     std::string other = file;
     other[begin + 41] = wrong;
-    const std::string error = errorOf(folder, other);
+    const std::string error = encodingError(folder, other);
     expectSays(error, fmt::format("byte {}: not valid base64", begin + 40));
     other = file;
     other[begin + 43] = wrong;
-    expectSays(errorOf(folder, other), fmt::format("byte {}: ", begin + 40));
+    expectSays(encodingError(folder, other), fmt::format("byte {}: ", begin + 40));
   }
 }
 

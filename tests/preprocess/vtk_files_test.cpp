@@ -50,7 +50,7 @@ uint32_t crcOf(const std::vector<Value>& values) {
 }
 
 /// The name that a scalar of these has, by that of VTK's array.
-std::string nameOf(const json& scalar, const json& all) {
+std::string scalarName(const json& scalar, const json& all) {
   const std::string name = scalar["name"];
   if (scalar["centring"] == "node") return name;
   const bool taken = std::any_of(all.begin(), all.end(), [&](const json& other) {
@@ -63,7 +63,7 @@ std::string nameOf(const json& scalar, const json& all) {
 
 void expectScalar(const GridDescription& description, const GridBlock& block, const NodeArrays& nodes,
                   const json& expected, const json& all) {
-  const std::string name = nameOf(expected, all);
+  const std::string name = scalarName(expected, all);
   SCOPED_TRACE(name);
   const uint32_t position = scalarsNamed(description, {name}).front();
   const bool of_cells = expected["centring"] == "cell";

@@ -24,15 +24,15 @@ namespace {
 
 using test::TestFolder;
 
-std::unique_ptr<GridSource> open(const std::filesystem::path& path) {
+std::unique_ptr<GridSource> openVtkSet(const std::filesystem::path& path) {
   OpenGridOptions options;
   options.grid = path;
   options.temporary_folder = path.parent_path();
   return openGrid(options);
 }
 
-std::string errorOf(const std::filesystem::path& path) {
-  return curvisplat::errorOf([&] { open(path); });
+std::string setError(const std::filesystem::path& path) {
+  return curvisplat::errorOf([&] { openVtkSet(path); });
 }
 
 std::string setOf(const std::string& type, const std::string& content, const std::string& attributes = "") {
@@ -109,7 +109,7 @@ std::filesystem::path writePieces(const TestFolder& folder) {
                          "WholeExtent=\"0 8 0 7 0 6\" GhostLevel=\"1\""));
 }
 
-ConvertReport convertTo(const std::filesystem::path& output, const GridSource& source) {
+ConvertReport convertPressure(const std::filesystem::path& output, const GridSource& source) {
   ConvertOptions options;
   options.output = output;
   options.scalars = scalarsNamed(source.description(), {"p"});
@@ -119,12 +119,12 @@ ConvertReport convertTo(const std::filesystem::path& output, const GridSource& s
 
 TEST(VtkSets, PiecesConvertAsTheWholeGridDoes) {
   const TestFolder folder("pvts");
-  const auto pieces = open(writePieces(folder));
+  const auto pieces = openVtkSet(writePieces(folder));
   EXPECT_EQ(pieces->description().blocks.size(), 8u);
   EXPECT_EQ(pieces->description().files.size(), 9u);
-  const auto whole = open(folder.write("whole.vts", vtsFile(annulusVtsGrid(9, 8, 7), {})));
-  const ConvertReport in_pieces = convertTo(folder.path() / "pieces.splats", *pieces);
-  const ConvertReport at_once = convertTo(folder.path() / "whole.splats", *whole);
+  const auto whole = openVtkSet(folder.write("whole.vts", vtsFile(annulusVtsGrid(9, 8, 7), {})));
+  const ConvertReport in_pieces = convertPressure(folder.path() / "pieces.splats", *pieces);
+  const ConvertReport at_once = convertPressure(folder.path() / "whole.splats", *whole);
   // Coincident nodes of the seams have merged.
   EXPECT_EQ(in_pieces.splats, at_once.splats);
   EXPECT_EQ(in_pieces.splats, 9u * 8 * 7);
@@ -136,7 +136,7 @@ TEST(VtkSets, PiecesElsewhereThanTheyShouldBeAreRefused) {
   const TestFolder folder("pvts-elsewhere");
   folder.write("a.vts", vtsFile(annulusVtsGrid(4, 4, 4), {}));
   const auto written = [&](const char* piece) {
-    return errorOf(folder.write("grid.pvts", setOf("PStructuredGrid", piece)));
+    return setError(folder.write("grid.pvts", setOf("PStructuredGrid", piece)));
   };
   EXPECT_EQ(written("<Piece Extent='0 3 0 3 0 3' Source='a.vts'/>"), "");
   expectSays(written("<Piece Extent='0 3 0 3 0 2' Source='a.vts'/>"), "a.vts: has a piece of 4x4x4 nodes");
@@ -151,7 +151,7 @@ TEST(VtkSets, BlocksAreNamedByTheirPlaceInTheTree) {
   const TestFolder folder("vtm");
   folder.write("a.vts", vtsFile(annulusVtsGrid(4, 4, 4), {}));
   folder.write("b.vts", vtsFile(annulusVtsGrid(3, 3, 3), {}));
-  const auto source = open(folder.write(
+  const auto source = openVtkSet(folder.write(
       "grid.vtm",
       setOf(
           "vtkMultiBlockDataSet",
@@ -171,7 +171,7 @@ TEST(VtkSets, BlocksWithoutAnArrayAreBlankInIt) {
   grid.point_data.erase(grid.point_data.begin());
   grid.point_data.push_back({"only b", "Int16", 1, std::vector<double>(27, 4)});
   folder.write("b.vts", vtsFile(grid, {}));
-  const auto source = open(folder.write(
+  const auto source = openVtkSet(folder.write(
       "grid.vtm", setOf("vtkMultiBlockDataSet", "<DataSet file='a.vts'/><DataSet file='b.vts'/>")));
   const GridDescription& description = source->description();
   ASSERT_EQ(description.warnings.size(), 2u);
@@ -189,24 +189,24 @@ TEST(VtkSets, FlatBlocksAreLeftOut) {
   VtsGrid flat = annulusVtsGrid(3, 3, 1);
   flat.cell_data[0].values.assign(4, 1);  // as VTK counts cells
   folder.write("flat.vts", vtsFile(flat, {}));
-  const auto source = open(folder.write(
+  const auto source = openVtkSet(folder.write(
       "grid.vtm", setOf("vtkMultiBlockDataSet", "<DataSet file='flat.vts'/><DataSet file='a.vts'/>")));
   EXPECT_EQ(source->description().blocks.size(), 1u);
   ASSERT_EQ(source->description().warnings.size(), 1u);
   EXPECT_EQ(source->description().warnings[0],
             "1 of 2 blocks are flat and left out, such as flat (3x3x1 nodes)");
   EXPECT_EQ(allNodes(*source, 0).x.size(), 27u);
-  expectSays(errorOf(folder.path() / "flat.vts"), "block 1 (3x3x1 nodes) is flat");
+  expectSays(setError(folder.path() / "flat.vts"), "block 1 (3x3x1 nodes) is flat");
 }
 
 TEST(VtkSets, FilesThatNameThemselvesAreRefused) {
   const TestFolder folder("vtm-cycle");
   folder.write("a.vtm", setOf("vtkMultiBlockDataSet", "<DataSet file='./b.vtm'/>"));
   const auto b = folder.write("b.vtm", setOf("vtkMultiBlockDataSet", "<DataSet file='a.vtm'/>"));
-  expectSays(errorOf(b), "contains itself");
+  expectSays(setError(b), "contains itself");
   const auto series = folder.write("c.pvd", setOf("Collection", "<DataSet timestep='0' file='d.pvd'/>"));
   folder.write("d.pvd", setOf("Collection", "<DataSet timestep='0' file='a.vts'/>"));
-  expectSays(errorOf(series), "a time series inside another");
+  expectSays(setError(series), "a time series inside another");
 }
 
 TEST(VtkSets, FilesThatNameOthersOverAndOverAreRefused) {
@@ -218,7 +218,7 @@ TEST(VtkSets, FilesThatNameOthersOverAndOverAreRefused) {
     folder.write(fmt::format("{}.vtm", level), setOf("vtkMultiBlockDataSet", members));
   }
   folder.write("10.vtm", setOf("vtkMultiBlockDataSet", ""));
-  expectSays(errorOf(folder.path() / "0.vtm"), "refers to more than 100000 files");
+  expectSays(setError(folder.path() / "0.vtm"), "refers to more than 100000 files");
 }
 
 /// Counts for `info` of a set that names one file `times` times: opened files, and reads.
@@ -228,7 +228,7 @@ std::pair<int64_t, int64_t> readForInfo(const TestFolder& folder, int times) {
   const auto path = folder.write("set.vtm", setOf("vtkMultiBlockDataSet", members));
   faults::FaultySystemCalls counting;
   const ScopedSystemCalls scope(counting);
-  const auto source = open(path);
+  const auto source = openVtkSet(path);
   Progress progress;
   EXPECT_EQ(measureGrid(*source, {0}, 32 << 20, progress).cells(), static_cast<uint64_t>(times));
   EXPECT_FALSE(findOverlaps(*source, {32 << 20, 128 << 20}, progress).empty());
@@ -254,7 +254,7 @@ TEST(VtkSets, ManyPiecesNeedFewOpenFiles) {
     folder.write(std::to_string(n) + ".vts", vtsFile(grid, {}));
     members += fmt::format("<DataSet file='{}.vts'/>", n);
   }
-  const auto source = open(folder.write("grid.vtm", setOf("vtkMultiBlockDataSet", members)));
+  const auto source = openVtkSet(folder.write("grid.vtm", setOf("vtkMultiBlockDataSet", members)));
   for (uint32_t b = 0; b < 200; ++b)
     EXPECT_FLOAT_EQ(static_cast<float>(allNodes(*source, b).x[0]), static_cast<float>(-std::sin(0.1 * b)));
   const auto files = std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});

@@ -301,11 +301,11 @@ TEST(BorderParts, KeepTheirFacesWhereTheyAreHalved) {
 }
 
 /// A brick of `count` equal splats.
-struct Brick {
+struct PiecedBrick {
   SplatGeometry geometry;
   SplatVariable variable;
 
-  Brick(size_t count, uint32_t border_code) {
+  PiecedBrick(size_t count, uint32_t border_code) {
     geometry.resize(count);
     variable.resize(count);
     Splat splat;
@@ -316,7 +316,7 @@ struct Brick {
   }
 };
 
-ProjectionCounts project(const Brick& brick, Projection projection,
+ProjectionCounts project(const PiecedBrick& brick, Projection projection,
                          const BorderStyle& borders = kHalfCellStyle) {
   Camera camera;
   camera.position = {0.5, 0.5, 4};
@@ -334,17 +334,17 @@ ProjectionCounts project(const Brick& brick, Projection projection,
 TEST(BorderParts, AreWhatHalfCellsAreDrawnAs) {
   const uint32_t corner = packBorderCode({kInward, 3});
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
-    const ProjectionCounts one = project(Brick(1, packBorderCode({kInward, 1})), projection);
+    const ProjectionCounts one = project(PiecedBrick(1, packBorderCode({kInward, 1})), projection);
     EXPECT_EQ(one.drawn, 1u);
     EXPECT_EQ(one.pieces, 2u);
-    EXPECT_EQ(project(Brick(10, corner), projection).pieces, 80u);
-    EXPECT_EQ(project(Brick(10, kNoBorder), projection).pieces, 10u);
+    EXPECT_EQ(project(PiecedBrick(10, corner), projection).pieces, 80u);
+    EXPECT_EQ(project(PiecedBrick(10, kNoBorder), projection).pieces, 10u);
   }
 }
 
 TEST(BorderParts, AtAFaceAreASplatAndItsCut) {
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
-    const ProjectionCounts one = project(Brick(7, packBorderCode({kInward, 2}, 3)), projection);
+    const ProjectionCounts one = project(PiecedBrick(7, packBorderCode({kInward, 2}, 3)), projection);
     EXPECT_EQ(one.drawn, 7u);
     EXPECT_EQ(one.pieces, 14u);
   }
@@ -353,18 +353,18 @@ TEST(BorderParts, AtAFaceAreASplatAndItsCut) {
 TEST(BorderParts, AreNotDrawnWhereABrickHasTooMany) {
   const uint32_t corner = packBorderCode({kInward, 3});
   const size_t count = BrickProjector::kMaxPieces / 8;
-  EXPECT_EQ(project(Brick(count, corner), Projection::kOrthographic).pieces, 8 * count);
-  EXPECT_EQ(project(Brick(count + 1, corner), Projection::kOrthographic).pieces, count + 1);
+  EXPECT_EQ(project(PiecedBrick(count, corner), Projection::kOrthographic).pieces, 8 * count);
+  EXPECT_EQ(project(PiecedBrick(count + 1, corner), Projection::kOrthographic).pieces, count + 1);
 }
 
 TEST(BorderParts, AreOneInsteadOfAPairWhereABrickHasTooMany) {
   const uint32_t face = packBorderCode({kInward, 1}, 1);
   // A pair is two cut splats, and room is kept for the whole that the first of them replaces.
   const size_t count = BrickProjector::kMaxPieces / 3;
-  EXPECT_EQ(project(Brick(count, face), Projection::kOrthographic, kWholeCellPairs).pieces, 4 * count);
-  EXPECT_EQ(project(Brick(count + 1, face), Projection::kOrthographic, kWholeCellPairs).pieces,
+  EXPECT_EQ(project(PiecedBrick(count, face), Projection::kOrthographic, kWholeCellPairs).pieces, 4 * count);
+  EXPECT_EQ(project(PiecedBrick(count + 1, face), Projection::kOrthographic, kWholeCellPairs).pieces,
             2 * (count + 1));
-  EXPECT_EQ(project(Brick(count + 1, face), Projection::kOrthographic, kWholeCellStyle).pieces,
+  EXPECT_EQ(project(PiecedBrick(count + 1, face), Projection::kOrthographic, kWholeCellStyle).pieces,
             2 * (count + 1));
 }
 

@@ -29,7 +29,7 @@ void expectNear(const glm::dvec3& a, const glm::dvec3& b, double tolerance = 1e-
       << a.x << " " << a.y << " " << a.z << " and " << b.x << " " << b.y << " " << b.z;
 }
 
-void expectSame(const Camera& a, const Camera& b) {
+void expectSameCamera(const Camera& a, const Camera& b) {
   EXPECT_EQ(a.position, b.position);
   EXPECT_EQ(a.focal_point, b.focal_point);
   EXPECT_EQ(a.view_up, b.view_up);
@@ -55,8 +55,9 @@ TEST(Orbit, GoesAroundTheFocalPointAboutViewUp) {
 
 TEST(Orbit, AWholeTurnIsTheSameCameraBitForBit) {
   const Camera camera = cameraAt({0.1, 0.2, 0.3}, {1.1, 2.7, 3.9}, {0.3, 0.1, 0.9});
-  for (const double degrees : {0.0, 360.0, -360.0, 7200.0}) expectSame(orbited(camera, degrees), camera);
-  expectSame(orbited(camera, 361), orbited(camera, 1));
+  for (const double degrees : {0.0, 360.0, -360.0, 7200.0})
+    expectSameCamera(orbited(camera, degrees), camera);
+  expectSameCamera(orbited(camera, 361), orbited(camera, 1));
 }
 
 TEST(Orbit, ViewUpAlongTheViewIsReplaced) {
@@ -94,8 +95,8 @@ TEST(Turns, APictureDoesNotTurnOverWhereTheCameraPassesAboveItsFocalPoint) {
       EXPECT_NEAR(glm::length(up.position), glm::length(from), 1e-12);
       expectNear(rightOf(up), rightOf(camera), 1e-9);
     }
-    expectSame(elevated(camera, 720), camera);
-    expectSame(rolled(camera, -360), camera);
+    expectSameCamera(elevated(camera, 720), camera);
+    expectSameCamera(rolled(camera, -360), camera);
   }
 }
 
@@ -117,9 +118,9 @@ TEST(CameraPath, MeetsItsKeyFramesExactly) {
   const CameraPath path(keys, "test");
   EXPECT_EQ(path.begin(), -1);
   EXPECT_EQ(path.end(), keys.back().time);
-  for (const KeyFrame& key : keys) expectSame(path.at(key.time), key.camera);
-  expectSame(path.at(-50), keys.front().camera);
-  expectSame(path.at(50), keys.back().camera);
+  for (const KeyFrame& key : keys) expectSameCamera(path.at(key.time), key.camera);
+  expectSameCamera(path.at(-50), keys.front().camera);
+  expectSameCamera(path.at(50), keys.back().camera);
   // And comes close to them from both sides.
   for (const KeyFrame& key : keys)
     for (const double nearby : {key.time - 1e-9, key.time + 1e-9}) {
@@ -232,7 +233,7 @@ TEST_F(CameraPathFile, IsReadAsItIsWritten) {
   EXPECT_EQ(path.end(), 2.5);
   Camera expected = cameraAt({1, 2, 3}, {0, 0, 0.5});
   expected.parallel_scale = 1.5;
-  expectSame(path.at(1), expected);
+  expectSameCamera(path.at(1), expected);
 
   const CameraPath perspective = read(
       R"({"note": "ours", "key_frames": [{"time": -1, "position": [1, 0, 0], "focal_point": [0, 0, 0],

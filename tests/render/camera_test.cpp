@@ -16,7 +16,7 @@ namespace {
 const glm::dvec3 kLower(-3, 10, 0.5), kUpper(5, 11, 4);
 const char* const kViews[] = {"iso", "+x", "-x", "+y", "-y", "+z", "-z"};
 
-glm::dvec3 corner(int n) {
+glm::dvec3 boxCorner(int n) {
   return {n & 1 ? kUpper.x : kLower.x, n & 2 ? kUpper.y : kLower.y, n & 4 ? kUpper.z : kLower.z};
 }
 
@@ -29,7 +29,7 @@ glm::dvec2 inImage(const Camera& camera, const glm::dvec3& world, ImageSize size
   return {view.x / half_height * size.height / size.width, view.y / half_height};
 }
 
-void expectNear(const glm::dvec3& a, const glm::dvec3& b, double tolerance = 1e-12) {
+void expectPointNear(const glm::dvec3& a, const glm::dvec3& b, double tolerance = 1e-12) {
   EXPECT_NEAR(glm::distance(a, b), 0, tolerance)
       << a.x << " " << a.y << " " << a.z << " and " << b.x << " " << b.y << " " << b.z;
 }
@@ -42,9 +42,9 @@ TEST(Camera, NamedViewsHoldTheBoxAndFillTheImage) {
           const Camera camera = Camera::named(view, kLower, kUpper, size, projection, angle);
           double furthest = 0;
           for (int n = 0; n < 8; ++n) {
-            const glm::dvec2 at = inImage(camera, corner(n), size);
+            const glm::dvec2 at = inImage(camera, boxCorner(n), size);
             furthest = std::max({furthest, std::abs(at.x), std::abs(at.y)});
-            EXPECT_LT((camera.viewFromWorld() * glm::dvec4(corner(n), 1)).z, 0) << view << " is in front";
+            EXPECT_LT((camera.viewFromWorld() * glm::dvec4(boxCorner(n), 1)).z, 0) << view << " is in front";
           }
           EXPECT_LT(furthest, 0.999) << view;
           // Beside a wide angle the nearest corner, not the margin, decides.
@@ -63,13 +63,13 @@ TEST(Camera, FitsTheBoxFromWhereItLooks) {
     camera.position = iso.focal_point + 7.0 * (iso.position - iso.focal_point);
     camera.parallel_scale = 17;
     camera.fit(kLower, kUpper, size);
-    expectNear(camera.position, iso.position, 1e-9);
+    expectPointNear(camera.position, iso.position, 1e-9);
     EXPECT_NEAR(camera.parallel_scale, iso.parallel_scale, 1e-9);
     camera.position = camera.focal_point + glm::dvec3(0.1, -3, 0.4);
     camera.fit(kLower, kUpper, size);
     double furthest = 0;
     for (int n = 0; n < 8; ++n) {
-      const glm::dvec2 at = inImage(camera, corner(n), size);
+      const glm::dvec2 at = inImage(camera, boxCorner(n), size);
       furthest = std::max({furthest, std::abs(at.x), std::abs(at.y)});
     }
     EXPECT_LT(furthest, 0.999);
@@ -86,15 +86,15 @@ TEST(Camera, NamedViewsLookFromWhereTheySay) {
                   {"+z", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}},  {"-z", {0, 0, -1}, {-1, 0, 0}, {0, 1, 0}}};
   for (const auto& e : expected) {
     const Camera camera = Camera::named(e.view, kLower, kUpper, {}, Projection::kOrthographic);
-    expectNear(camera.focal_point, 0.5 * (kLower + kUpper));
-    expectNear(glm::normalize(camera.position - camera.focal_point), e.from);
+    expectPointNear(camera.focal_point, 0.5 * (kLower + kUpper));
+    expectPointNear(glm::normalize(camera.position - camera.focal_point), e.from);
     const glm::dmat4 view = camera.viewFromWorld();
-    expectNear(glm::dvec3(view * glm::dvec4(e.right, 0)), {1, 0, 0});
-    expectNear(glm::dvec3(view * glm::dvec4(e.up, 0)), {0, 1, 0});
-    expectNear(glm::dvec3(view * glm::dvec4(e.from, 0)), {0, 0, 1});
+    expectPointNear(glm::dvec3(view * glm::dvec4(e.right, 0)), {1, 0, 0});
+    expectPointNear(glm::dvec3(view * glm::dvec4(e.up, 0)), {0, 1, 0});
+    expectPointNear(glm::dvec3(view * glm::dvec4(e.from, 0)), {0, 0, 1});
   }
   const Camera iso = Camera::named("iso", kLower, kUpper, {}, Projection::kOrthographic);
-  expectNear(glm::normalize(iso.position - iso.focal_point), glm::dvec3(1 / std::sqrt(3.0)));
+  expectPointNear(glm::normalize(iso.position - iso.focal_point), glm::dvec3(1 / std::sqrt(3.0)));
   EXPECT_GT((iso.viewFromWorld() * glm::dvec4(0, 0, 1, 0)).y, 0.8);
 }
 
@@ -105,9 +105,9 @@ TEST(Camera, ViewSpaceIsRightHandedWithThePositionAtItsOrigin) {
   camera.view_up = {0.2, 0.1, 1};
   const glm::dmat4 view = camera.viewFromWorld();
   EXPECT_NEAR(glm::determinant(view), 1, 1e-12);
-  expectNear(glm::dvec3(view * glm::dvec4(camera.position, 1)), {0, 0, 0});
-  expectNear(glm::dvec3(view * glm::dvec4(camera.focal_point, 1)),
-             {0, 0, -glm::distance(camera.position, camera.focal_point)});
+  expectPointNear(glm::dvec3(view * glm::dvec4(camera.position, 1)), {0, 0, 0});
+  expectPointNear(glm::dvec3(view * glm::dvec4(camera.focal_point, 1)),
+                  {0, 0, -glm::distance(camera.position, camera.focal_point)});
   const glm::dvec3 up(view * glm::dvec4(camera.view_up, 0));
   EXPECT_NEAR(up.x, 0, 1e-12);
   EXPECT_GT(up.y, 0);
@@ -117,7 +117,7 @@ TEST(Camera, AnUpAlongTheViewIsReplacedAsVtkDoes) {
   Camera camera;
   camera.position = {0, 0, 5};
   camera.view_up = {0, 0, 1};  // VTK: (-z, x, y) = (-1, 0, 0)
-  expectNear(glm::dvec3(camera.viewFromWorld() * glm::dvec4(-1, 0, 0, 0)), {0, 1, 0});
+  expectPointNear(glm::dvec3(camera.viewFromWorld() * glm::dvec4(-1, 0, 0, 0)), {0, 1, 0});
   // VTK's replacement of (1, -1, 1) lies along it again; zero and nearly parallel vectors do not help either.
   for (const glm::dvec3& up : {glm::dvec3(1, -1, 1), glm::dvec3(0), glm::dvec3(1.00001, -1, 1)}) {
     camera.position = {2, -2, 2};

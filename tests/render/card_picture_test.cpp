@@ -32,7 +32,7 @@ std::vector<uint8_t> bytesOf(const Image& image) {
   return bytes;
 }
 
-int largestDifference(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
+int largestByteDifference(const std::vector<uint8_t>& a, const std::vector<uint8_t>& b) {
   if (a.size() != b.size()) return 256;
   int largest = 0;
   for (size_t n = 0; n < a.size(); ++n) largest = std::max(largest, std::abs(int{a[n]} - int{b[n]}));
@@ -129,7 +129,7 @@ TEST_F(CardPictureTest, HasTheBytesOfThePictureThatIsRead) {
     const Image read = renderer_->render(camera(), wanted, statistics_);
     EXPECT_GE(statistics_.card_read_bytes, 16 * wanted.size.pixels()) << name;
     // Fused multiply-adds may round a channel to the next number of 8 bits.
-    EXPECT_LE(largestDifference(window_->read(*on_card), bytesOf(read)), 1) << name;
+    EXPECT_LE(largestByteDifference(window_->read(*on_card), bytesOf(read)), 1) << name;
   }
 }
 
@@ -155,8 +155,8 @@ TEST_F(CardPictureTest, StaysWhileLaterOnesAreDrawnAndThenGoes) {
     bytes.push_back(bytesOf(renderer_->render(camera(view), options(), statistics_)));
   std::vector<GLuint> names;
   for (size_t n = 0; n < pictures.size(); ++n) {
-    EXPECT_LE(largestDifference(window_->read(*pictures[n]), bytes[n]), 1) << n;
-    EXPECT_GT(largestDifference(window_->read(*pictures[n]), bytes[(n + 1) % 3]), 9) << n;
+    EXPECT_LE(largestByteDifference(window_->read(*pictures[n]), bytes[n]), 1) << n;
+    EXPECT_GT(largestByteDifference(window_->read(*pictures[n]), bytes[(n + 1) % 3]), 9) << n;
     names.push_back(pictures[n]->texture());
   }
   pictures.erase(pictures.begin() + 1, pictures.end());
@@ -166,7 +166,7 @@ TEST_F(CardPictureTest, StaysWhileLaterOnesAreDrawnAndThenGoes) {
     EXPECT_TRUE(names[gone] == next->texture() || !window_->isTexture(names[gone])) << gone;
   // It outlives its painter.
   renderer_.reset();
-  EXPECT_LE(largestDifference(window_->read(*pictures[0]), bytes[0]), 1);
+  EXPECT_LE(largestByteDifference(window_->read(*pictures[0]), bytes[0]), 1);
 }
 
 TEST_F(CardPictureTest, OfFewerPixelsIsShownAsItWouldBeEnlarged) {

@@ -138,7 +138,7 @@ SplatPiece randomPiece(std::mt19937& random, float aspect) {
           0.5f + unit(random)};
 }
 
-glm::dmat3 factorOf(const Shape& s) {
+glm::dmat3 factorOfPiece(const Shape& s) {
   return {s.axis0, s.axis0 * s.shear10, s.axis0 * s.shear20, 0, s.axis1, s.axis1 * s.shear21, 0, 0, s.axis2};
 }
 
@@ -161,7 +161,7 @@ struct Moments {
       const glm::dvec3 e = glm::dvec3(piece.position) - position,
                        w(piece.slope.w0, piece.slope.w1, piece.slope.w2);
       const double d = piece.mean - mean;
-      const glm::dmat3 factor = factorOf(piece.shape);
+      const glm::dmat3 factor = factorOfPiece(piece.shape);
       shape += share * (factor * glm::transpose(factor) + 12.0 * glm::outerProduct(e, e));
       slope += share * (factor * w + 12 * d * e);
       square += share * (glm::dot(w, w) / 12 + d * d);
@@ -189,7 +189,7 @@ TEST(SplatCutter, HalvesMergeIntoTheWhole) {
   }
 }
 
-ScreenView viewFrom(const glm::dvec3& eye, double angle) {
+ScreenView perspectiveFrom(const glm::dvec3& eye, double angle) {
   Camera camera;
   camera.position = eye;
   camera.focal_point = eye + glm::dvec3(0.2, 0.1, -1);
@@ -204,7 +204,7 @@ TEST(SplatCutter, PiecesInSightAreSmallForTheirDistanceAndMergeIntoTheWhole) {
   for (int n = 0; n < 50; ++n) {
     const SplatPiece whole = randomPiece(random, 30);
     // All of it in sight: far enough, and a wide angle.
-    const PerspectiveMap map(viewFrom({0, 0, 9}, 140), glm::dvec3(0), 0.04f);
+    const PerspectiveMap map(perspectiveFrom({0, 0, 9}, 140), glm::dvec3(0), 0.04f);
     std::vector<SplatPiece> pieces;
     size_t looks = 1'000'000;
     ASSERT_TRUE(cutUp(map, whole, looks, [&](const SplatPiece& piece, const PerspectiveMap::Centre& centre) {
@@ -224,7 +224,7 @@ TEST(SplatCutter, APencilIsCutAcrossOnly) {
   pencil.shape = {1e-3f, 1e-3f, 1.0f, 0, 0, 0};
   pencil.weight = 1;
   size_t pieces = 0, looks = 10'000;
-  ASSERT_TRUE(cutUp(PerspectiveMap(viewFrom({0.05, 0, 0}, 60), glm::dvec3(0), 1), pencil, looks,
+  ASSERT_TRUE(cutUp(PerspectiveMap(perspectiveFrom({0.05, 0, 0}, 60), glm::dvec3(0), 1), pencil, looks,
                     [&](const SplatPiece&, const PerspectiveMap::Centre&) { return ++pieces < 1000; }));
   EXPECT_GT(pieces, 3u);
   EXPECT_LT(pieces, 100u);
@@ -244,7 +244,7 @@ TEST(SplatCutter, EndsWhateverTheSize) {
         (*array)[0] = size;
       geometry.shear10[0] = geometry.shear20[0] = geometry.shear21[0] = 1;
       variable.mean[0] = 0.5f;
-      ProjectionSettings settings{viewFrom({0.1, 0.2, 0.3}, 60)};
+      ProjectionSettings settings{perspectiveFrom({0.1, 0.2, 0.3}, 60)};
       settings.view.near = near;
       BrickProjector projector;
       projector.project(settings, table, glm::dvec3(0), geometry, variable);
@@ -273,7 +273,7 @@ TEST(Projection, FromWithinTheData) {
   }
   const ClassificationTable table([](double) { return TransferFunction::Value{glm::dvec3(1), 1}; }, 0, 1);
   BrickProjector projector;
-  projector.project({viewFrom({0.5, 0.5, 0.5}, 60)}, table, glm::dvec3(0), geometry, variable);
+  projector.project({perspectiveFrom({0.5, 0.5, 0.5}, 60)}, table, glm::dvec3(0), geometry, variable);
   EXPECT_LE(projector.splats().size(), BrickProjector::kMaxSplats);
   EXPECT_GT(projector.counts().drawn, 1000u);
   EXPECT_GT(projector.counts().pieces, projector.counts().drawn);

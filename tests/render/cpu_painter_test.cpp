@@ -17,11 +17,12 @@
 namespace curvisplat {
 namespace {
 
-constexpr glm::vec4 kWhite{1, 1, 1, 1};
+constexpr glm::vec4 kWhiteBackground{1, 1, 1, 1};
 
 /// Farthest first.
 Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
-            ImageSize size, const glm::vec4& background = kWhite, const PaintResources& resources = {}) {
+            ImageSize size, const glm::vec4& background = kWhiteBackground,
+            const PaintResources& resources = {}) {
   CpuPainter painter;
   return paintFrame(painter, splats, table, {per_pixel}, {size, background}, resources);
 }
@@ -60,7 +61,7 @@ TEST_P(OnEveryTarget, DrawsOpaqueSplatsAsSpecified) {
   for (const bool per_pixel : {true, false}) {
     const auto splats = randomSplats(60, 11, size, 0.3f, 100);
     EXPECT_LT(largestDifference(paint(splats, smooth(), per_pixel, size),
-                                compositeSplats(splats, smooth(), {per_pixel}, size, kWhite)),
+                                compositeSplats(splats, smooth(), {per_pixel}, size, kWhiteBackground)),
               2e-3);
   }
 }
@@ -75,9 +76,9 @@ TEST_P(OnEveryTarget, IsRightWhereExtinctionEnds) {
       0, 1);
   for (const float slope : {0.01f, 0.1f}) {
     const auto splats = randomSplats(400, 17, size, slope, 5);
-    EXPECT_LT(
-        largestDifference(paint(splats, ramp, true, size), compositeSplats(splats, ramp, {}, size, kWhite)),
-        4e-3);
+    EXPECT_LT(largestDifference(paint(splats, ramp, true, size),
+                                compositeSplats(splats, ramp, {}, size, kWhiteBackground)),
+              4e-3);
   }
 }
 
@@ -88,7 +89,7 @@ TEST_P(OnEveryTarget, IsTheSameForAnyThreadsAndBatches) {
     const Image first = paint(splats, lively(), true, size);
     for (const unsigned threads : {1u, 2u, 3u, 8u})
       for (const size_t batch : {size_t{1}, size_t{100}, size_t{1024}, size_t{65536}})
-        EXPECT_EQ(paint(splats, lively(), true, size, kWhite, {threads, batch}).rgba, first.rgba)
+        EXPECT_EQ(paint(splats, lively(), true, size, kWhiteBackground, {threads, batch}).rgba, first.rgba)
             << threads << " threads, batches of " << batch << ", opacity " << opacity;
   }
 }
@@ -109,7 +110,7 @@ TEST_P(OnEveryTarget, DrawsPartsOfTilesAsTheWhole) {
       for (const uint32_t owner : {0u, 1u}) {
         const TileSet tiles(size, owners, owner);
         CpuPainter painter;
-        painter.begin(size, kWhite, table, {true});
+        painter.begin(size, kWhiteBackground, table, {true});
         painter.drawOnly(tiles);
         painter.draw(splats);
         const Image part = painter.end();
@@ -224,7 +225,7 @@ TEST(CpuPainter, DrawsNothingBehindWhatIsOpaque) {
   auto splats = far;
   splats.push_back(wall);
   CpuPainter painter;
-  const Image image = paintFrame(painter, splats, lively(), {}, {size, kWhite}, {2, 100});
+  const Image image = paintFrame(painter, splats, lively(), {}, {size, kWhiteBackground}, {2, 100});
   EXPECT_EQ(image.rgba, paint({&wall, 1}, lively(), true, size).rgba);
   EXPECT_GE(painter.hiddenSplats(), 1900u);
   EXPECT_LE(painter.hiddenSplats(), 2000u);
@@ -234,7 +235,7 @@ TEST(CpuPainter, HidesWhatIsBehindOpaqueBlocks) {
   const ImageSize size{150, 101};
   const auto table = lively();
   CpuPainter painter;
-  painter.begin(size, kWhite, table, {}, {2, 1});  // batches of one splat
+  painter.begin(size, kWhiteBackground, table, {}, {2, 1});  // batches of one splat
   EXPECT_FALSE(painter.hides({0, 0, 150, 101}));
   EXPECT_TRUE(painter.hides({-20, 5, -1, 9}));  // what is outside of the image
   EXPECT_TRUE(painter.hides({150, 5, 1e30f, 9}));
@@ -247,7 +248,7 @@ TEST(CpuPainter, HidesWhatIsBehindOpaqueBlocks) {
   EXPECT_FALSE(painter.hides({55, 55, 120, 65}));
   EXPECT_FALSE(painter.hides({-INFINITY, -INFINITY, INFINITY, INFINITY}));
   painter.end();
-  painter.begin(size, kWhite, table, {}, {2, 1});
+  painter.begin(size, kWhiteBackground, table, {}, {2, 1});
   EXPECT_FALSE(painter.hides({55, 55, 65, 65}));
 }
 
@@ -258,8 +259,8 @@ TEST(CpuPainter, WhatItHidesCannotBeSeen) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> unit(0, 1);
   CpuPainter all, some;
-  all.begin(size, kWhite, table, {}, {2, 64});
-  some.begin(size, kWhite, table, {}, {1, 32});
+  all.begin(size, kWhiteBackground, table, {}, {2, 64});
+  some.begin(size, kWhiteBackground, table, {}, {1, 32});
   int hidden = 0;
   for (const ScreenSplat& splat : randomSplats(6000, 21, size, 0.3f, 20)) {
     const auto reach_x = static_cast<float>(kKernelSupport) * splat.l11;
@@ -292,7 +293,7 @@ TEST(CpuPainter, PaintsNothingMoreOnceStopped) {
   for (const bool before_drawing : {true, false}) {
     std::stop_source stopping;
     CpuPainter painter;
-    painter.begin(size, kWhite, table, {}, {.stop = stopping.get_token()});
+    painter.begin(size, kWhiteBackground, table, {}, {.stop = stopping.get_token()});
     if (before_drawing) stopping.request_stop();
     painter.draw(splats);
     stopping.request_stop();  // before end(), which paints what fills no batch

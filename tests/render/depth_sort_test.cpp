@@ -41,7 +41,7 @@ class DepthKeysTest : public testing::Test {
 };
 
 /// A splat at the middle of the picture that leans by so many pixels of depth a pixel.
-ScreenSplat leaning(float x, float y) {
+ScreenSplat leaningSplat(float x, float y) {
   ScreenSplat splat{60, 50, 3, 0, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, x, y};
   return splat;
 }
@@ -75,7 +75,7 @@ TEST_F(DepthKeysTest, AreInTheOrderOfTheDepths) {
             depths.push_back(static_cast<float>(perspective ? 1 / view.orderBase(corner) - 1 / z
                                                             : z - view.viewFromData(corner).z));
           }
-          std::vector<ScreenSplat> splats(depths.size(), leaning(0, 0));
+          std::vector<ScreenSplat> splats(depths.size(), leaningSplat(0, 0));
           std::vector<uint32_t> keys(depths.size()), free(depths.size());
           made.setKeys(splats, depths, corner, {0, ~uint32_t{0}}, free);
           made.setKeys(splats, depths, corner, range, keys);
@@ -110,7 +110,7 @@ TEST_F(DepthKeysTest, StayInTheirBricksRangeWhateverTheDepth) {
     for (const float slope : {0.0f, 5.0f}) {
       const DepthKeys made(viewFrom({90, 20, 30}, projection, glm::dvec3(1)), root);
       const KeyRange range = made.rangeOf(brick);
-      std::vector<ScreenSplat> splats(depths.size(), leaning(slope, slope));
+      std::vector<ScreenSplat> splats(depths.size(), leaningSplat(slope, slope));
       made.setKeys(splats, depths, root.cellMin(brick.cell), range, keys);
       for (const uint32_t key : keys) {
         EXPECT_GE(key, range.first);
@@ -143,12 +143,12 @@ TEST_F(DepthKeysTest, ASplatThatLeansHasItsPlanesDepthInEveryTile) {
     const double step = 1e-4;
     const double z_pixels = view.focal_px / (perspective ? at.z : 1);
     ScreenSplat splat =
-        leaning(static_cast<float>((depthAt(pixel + glm::dvec2(step, 0)) - at.z) / step * z_pixels),
-                static_cast<float>((depthAt(pixel + glm::dvec2(0, step)) - at.z) / step * z_pixels));
+        leaningSplat(static_cast<float>((depthAt(pixel + glm::dvec2(step, 0)) - at.z) / step * z_pixels),
+                     static_cast<float>((depthAt(pixel + glm::dvec2(0, step)) - at.z) / step * z_pixels));
     splat.x = static_cast<float>(pixel.x);
     splat.y = static_cast<float>(pixel.y);
     const auto keyOfDepth = [&](double z) {
-      ScreenSplat flat = leaning(0, 0);
+      ScreenSplat flat = leaningSplat(0, 0);
       const float depth = static_cast<float>(perspective ? 1 / view.orderBase(corner) - 1 / z
                                                          : z - view.viewFromData(corner).z);
       uint32_t key = 0;

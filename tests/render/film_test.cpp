@@ -53,7 +53,7 @@ TransferFunction functionAt(const Film& film, double time) {
   return TransferFunction(definition, nullptr, definition.opacity_unit);
 }
 
-void expectSame(const TransferFunction& a, const TransferFunction& b, double tolerance) {
+void expectSameFunction(const TransferFunction& a, const TransferFunction& b, double tolerance) {
   EXPECT_NEAR(a.range().first, b.range().first, 1e-12);
   EXPECT_NEAR(a.range().second, b.range().second, 1e-12);
   for (double x = a.range().first; x <= a.range().second; x += 0.0137) {
@@ -66,13 +66,15 @@ TEST_F(FilmTest, OneMapMovesItsRangeAndItsPoints) {
   const Film film = read(keys({parts("viridis", "0, 1", "0:0,0.2:0.1,1:0.5", "0.25"),
                                parts("viridis", "2, 5", "0:0.4,0.6:0.3,1:0.1", "1")}));
   EXPECT_TRUE(film.functionsChange());
-  expectSame(functionAt(film, 0),
-             FunctionParts{"viridis", {0, 1}, {}, {{0, 0}, {0.2, 0.1}, {1, 0.5}}, 0.25}.function(), 0);
-  expectSame(functionAt(film, 2),
-             FunctionParts{"viridis", {2, 5}, {}, {{0, 0.4}, {0.6, 0.3}, {1, 0.1}}, 1}.function(), 0);
+  expectSameFunction(functionAt(film, 0),
+                     FunctionParts{"viridis", {0, 1}, {}, {{0, 0}, {0.2, 0.1}, {1, 0.5}}, 0.25}.function(),
+                     0);
+  expectSameFunction(functionAt(film, 2),
+                     FunctionParts{"viridis", {2, 5}, {}, {{0, 0.4}, {0.6, 0.3}, {1, 0.1}}, 1}.function(), 0);
   // Half way the range is 1 to 3.
-  expectSame(functionAt(film, 1),
-             FunctionParts{"viridis", {1, 3}, {}, {{0, 0.2}, {0.4, 0.2}, {1, 0.3}}, 0.5}.function(), 1e-9);
+  expectSameFunction(functionAt(film, 1),
+                     FunctionParts{"viridis", {1, 3}, {}, {{0, 0.2}, {0.4, 0.2}, {1, 0.3}}, 0.5}.function(),
+                     1e-9);
 }
 
 TEST_F(FilmTest, OtherMapsAndCountsOfPointsAreBlended) {
@@ -183,7 +185,7 @@ TEST_F(FilmTest, IsWrittenAsItIsRead) {
     EXPECT_EQ(film.scalar(), "density");
     EXPECT_FALSE(film.functionsChange());
     EXPECT_EQ(film.cameras().seriesTimeAt(1), 3.5);
-    expectSame(functionAt(read(text), 1), functionAt(film, 0), 1e-9);
+    expectSameFunction(functionAt(read(text), 1), functionAt(film, 0), 1e-9);
   }
 }
 

@@ -186,9 +186,9 @@ TEST(FootprintSkew, IsTheSkewedKernelsIntegralAlongTheRay) {
     }
 }
 
-constexpr ImageSize kSize{100, 80};
+constexpr ImageSize kFootprintPicture{100, 80};
 
-glm::dmat3 factorOf(const Shape& s) {
+glm::dmat3 factorMatrix(const Shape& s) {
   return glm::dmat3(glm::dvec3(s.axis0, s.axis0 * s.shear10, s.axis0 * s.shear20),
                     glm::dvec3(0, s.axis1, s.axis1 * s.shear21), glm::dvec3(0, 0, s.axis2));
 }
@@ -199,7 +199,7 @@ ScreenView viewOf(Projection projection, const glm::dvec3& scale = glm::dvec3(1)
   camera.focal_point = {0.5, 0, 0.25};
   camera.view_up = {0, 0, 1};
   camera.projection = projection;
-  return ScreenView::of(camera, kSize, scale, kLowPass, 1e-3);
+  return ScreenView::of(camera, kFootprintPicture, scale, kLowPass, 1e-3);
 }
 
 TEST(Light, IsPackedWithTheHalfWidth) {
@@ -245,7 +245,7 @@ TEST(Light, IsThatOfTheGradientInTheWorld) {
               .of(static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z), shape, slope);
 
       const glm::dvec3 w(slope.w0, slope.w1, slope.w2);
-      const glm::dvec3 g = glm::inverse(glm::transpose(factorOf(shape))) * w / scale;
+      const glm::dvec3 g = glm::inverse(glm::transpose(factorMatrix(shape))) * w / scale;
       const double strength = glm::dot(g, g) / (glm::dot(g, g) + g0 * g0);
       const glm::dvec3 viewer = projection == Projection::kPerspective
                                     ? glm::normalize(view.eye - scale * (origin + at))

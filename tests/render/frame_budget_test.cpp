@@ -116,7 +116,7 @@ TEST(ReducedSize, ShowsWhatTheCameraShowsInTheWholeImage) {
 }
 
 /// The number's place in the table, and `more`.
-FrameStatistics numbered(double more) {
+FrameStatistics numberedStatistics(double more) {
   FrameStatistics statistics;
   double n = more;
   for (const auto& field : statisticsFields())
@@ -125,7 +125,7 @@ FrameStatistics numbered(double more) {
 }
 
 TEST(FrameStatistics, EachNumberHasANameAndAPlaceOfItsOwn) {
-  const FrameStatistics statistics = numbered(0);
+  const FrameStatistics statistics = numberedStatistics(0);
   std::set<std::string> names;
   double n = 0;
   for (const auto& field : statisticsFields()) {
@@ -137,7 +137,7 @@ TEST(FrameStatistics, EachNumberHasANameAndAPlaceOfItsOwn) {
 }
 
 TEST(FrameStatistics, RanksAddUpOrHaveTheSame) {
-  FrameStatistics whole = numbered(0), other = numbered(100);
+  FrameStatistics whole = numberedStatistics(0), other = numberedStatistics(100);
   other.total_s = 1e6;
   whole.bricks_unreadable = {{3, "a"}, {7, "b"}};
   other.bricks_unreadable = {{5, "c"}, {7, "d"}};
@@ -155,7 +155,7 @@ TEST(FrameStatistics, RanksAddUpOrHaveTheSame) {
 }
 
 TEST(FrameStatistics, AThreadAddsItsStageAlone) {
-  FrameStatistics sum = numbered(0);
+  FrameStatistics sum = numberedStatistics(0);
   const FrameStatistics before = sum;
   PrepareStatistics part;
   part.project_s = 2;

@@ -16,7 +16,7 @@
 namespace curvisplat {
 namespace {
 
-Camera cameraFrom(const glm::dvec3& position, const glm::dvec3& focal_point, Projection projection) {
+Camera cameraLookingAt(const glm::dvec3& position, const glm::dvec3& focal_point, Projection projection) {
   Camera camera;
   camera.position = position;
   camera.focal_point = focal_point;
@@ -47,7 +47,8 @@ TEST_F(HiddenBricksTest, BoxesHoldAllFootprints) {
   int bounded = 0;
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective})
     for (const double distance : {80.0, 30.0, 12.0}) {
-      const Camera camera = cameraFrom(middle + distance * glm::dvec3(0.6, 0.64, 0.48), middle, projection);
+      const Camera camera =
+          cameraLookingAt(middle + distance * glm::dvec3(0.6, 0.64, 0.48), middle, projection);
       for (const glm::dvec3& scale : {glm::dvec3(1), glm::dvec3(1, 2, 0.5)}) {
         const ProjectionSettings settings{ScreenView::of(camera, {120, 100}, scale, 1.5, 0.01)};
         for (uint32_t id = 0; id < cache.bricks().size(); ++id) {
@@ -76,7 +77,7 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
   const CacheReader cache(folder_ / "lattice.splats");
   const auto table = ClassificationTable::of(grey(), 0, 1);
   const glm::dvec3 middle(0.5 * kLatticeSide);
-  const Camera camera = cameraFrom(middle + glm::dvec3(80, 0, 0), middle, Projection::kOrthographic);
+  const Camera camera = cameraLookingAt(middle + glm::dvec3(80, 0, 0), middle, Projection::kOrthographic);
   HiddenBricks hidden;
   const ScreenView view = ScreenView::of(camera, {100, 100}, glm::dvec3(1), 1.5, 1);
   hidden.begin(cache.bricks(), view);

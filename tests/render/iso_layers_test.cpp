@@ -24,7 +24,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{96, 80};
+constexpr ImageSize kIsoPicture{96, 80};
 constexpr uint32_t kParts = 7;
 constexpr int kCells = 24;  // along an edge of the cube [-1, 1]³
 
@@ -59,9 +59,9 @@ class IsoLayersTest : public testing::Test {
 
   IsoLayers drawn(std::vector<double> values, const std::vector<TileRange>& ranges, int threads = 1) {
     const WithCorrections scope({{}, {}, corrections_});
-    view_ = ScreenView::of(camera_, kSize, glm::dvec3(1), kLowPass, 1e-3);
+    view_ = ScreenView::of(camera_, kIsoPicture, glm::dvec3(1), kLowPass, 1e-3);
     const ColourTable colours(KnownFunction::of("smooth").table);
-    IsoLayers layers(kSize);
+    IsoLayers layers(kIsoPicture);
     for (const TileRange& tiles : ranges) {
       IsoSplats splats({view_, values, kHalfCellStyle, planes_, 0, tiles, uint64_t{1} << 30}, kParts);
       addParts(splats, threads);
@@ -89,11 +89,12 @@ class IsoLayersTest : public testing::Test {
           if (part % threads == thread) add(static_cast<uint32_t>(part));
       });
   }
-  static TileRange all() { return {0, TileSet::tilesOf(kSize)}; }
+  static TileRange all() { return {0, TileSet::tilesOf(kIsoPicture)}; }
 
   glm::dvec3 placeAt(int x, int y, double depth) const {
     const glm::dvec2 across =
-        (glm::dvec2(x + 0.5, y + 0.5) - 0.5 * glm::dvec2(kSize.width, kSize.height)) / view_.focal_px;
+        (glm::dvec2(x + 0.5, y + 0.5) - 0.5 * glm::dvec2(kIsoPicture.width, kIsoPicture.height)) /
+        view_.focal_px;
     if (view_.projection == Projection::kPerspective) {
       const glm::dvec3 ray = view_.forward + across.x * view_.right + across.y * view_.down;
       return view_.eye + depth * glm::normalize(ray);
@@ -118,8 +119,8 @@ TEST_F(IsoLayersTest, ThatOfALinearFieldIsAPlane) {
     camera_.projection = projection;
     const IsoLayers layers = drawn({0.1}, {all()});
     size_t seen = 0;
-    for (int y = 0; y < kSize.height; ++y)
-      for (int x = 0; x < kSize.width; ++x) {
+    for (int y = 0; y < kIsoPicture.height; ++y)
+      for (int x = 0; x < kIsoPicture.width; ++x) {
         const auto found = layers.at(x, y);
         // Not at outlines, where rays do not all meet it.
         if (found.size() != 1 || found[0].colour.w < 1) continue;
@@ -136,8 +137,8 @@ TEST_F(IsoLayersTest, ThatOfASphereIsRound) {
     const IsoLayers layers = drawn({0.7}, {all()});
     double most = 0;
     size_t seen = 0;
-    for (int y = 0; y < kSize.height; ++y)
-      for (int x = 0; x < kSize.width; ++x)
+    for (int y = 0; y < kIsoPicture.height; ++y)
+      for (int x = 0; x < kIsoPicture.width; ++x)
         for (const PixelLayer& layer : layers.at(x, y)) {
           if (layer.colour.w < 1) continue;
           EXPECT_EQ(layer.scalar, 0.7f);
@@ -169,8 +170,8 @@ TEST_F(IsoLayersTest, ItEndsWhereTheDataDoes) {
     const IsoLayers layers = drawn({0.1}, {all()});
     double behind = 0;
     size_t before = 0;
-    for (int y = 20; y < kSize.height - 20; ++y)
-      for (int x = 0; x < kSize.width; ++x)
+    for (int y = 20; y < kIsoPicture.height - 20; ++y)
+      for (int x = 0; x < kIsoPicture.width; ++x)
         for (const PixelLayer& layer : layers.at(x, y)) {
           const double at = placeAt(x, y, double{layer.depth}).x;
           before += at > -1 && layer.colour.w >= 1;
@@ -179,7 +180,7 @@ TEST_F(IsoLayersTest, ItEndsWhereTheDataDoes) {
     EXPECT_GT(before, 500u);
     return behind;
   };
-  const double pixel = 2 * camera_.parallel_scale / kSize.height;
+  const double pixel = 2 * camera_.parallel_scale / kIsoPicture.height;
   EXPECT_LT(reach(), pixel);
   corrections_.ended = false;
   EXPECT_GT(reach(), 3 * pixel);
@@ -195,15 +196,15 @@ TEST_F(IsoLayersTest, OutlinesOfLargeCellsAreSmooth) {
   camera_.parallel_scale = 0.055;
   const IsoLayers layers = drawn({0.15}, {all()});
   std::vector<double> covered;
-  for (int y = 0; y < kSize.height; ++y) {
+  for (int y = 0; y < kIsoPicture.height; ++y) {
     covered.push_back(0);
-    for (int x = 0; x < kSize.width; ++x) {
+    for (int x = 0; x < kIsoPicture.width; ++x) {
       double through = 1;
       for (const PixelLayer& layer : layers.at(x, y)) through *= 1 - double{layer.colour.w};
       covered.back() += 1 - through;
     }
   }
-  EXPECT_NEAR(covered[kSize.height / 2], kSize.width / 2, 12);
+  EXPECT_NEAR(covered[kIsoPicture.height / 2], kIsoPicture.width / 2, 12);
   double most = 0;
   for (size_t y = 1; y + 1 < covered.size(); ++y)
     most = std::max(most, std::abs(covered[y - 1] - 2 * covered[y] + covered[y + 1]));
@@ -218,8 +219,8 @@ TEST_F(IsoLayersTest, OutlinesAtTheEdgeOfTilesAreSmooth) {
   for (const bool left : {true, false}) {
     // The plane's edge is at a part of a pixel on either side of the first two tiles' edge.
     const double edge_px = left ? kTileSide - 0.4 : kTileSide + 0.4;
-    const double at = (edge_px - 0.5 * kSize.width) * 2 * camera_.parallel_scale / kSize.height;
-    const glm::dvec3 right = ScreenView::of(camera_, kSize, glm::dvec3(1), kLowPass, 1e-3).right;
+    const double at = (edge_px - 0.5 * kIsoPicture.width) * 2 * camera_.parallel_scale / kIsoPicture.height;
+    const glm::dvec3 right = ScreenView::of(camera_, kIsoPicture, glm::dvec3(1), kLowPass, 1e-3).right;
     planes_ = {{at * right, left ? right : -right}};
     const int half = left ? kTileSide - 1 : kTileSide, y = kTileSide + 5;
     const auto alpha = [&](const IsoLayers& layers, int x) {
@@ -239,9 +240,9 @@ TEST_F(IsoLayersTest, ClipPlanesOpenIt) {
   setField([](const glm::dvec3& at) { return glm::length(at); });
   planes_ = {{glm::dvec3(0.0), glm::dvec3(-1, 0, 0)}};
   const IsoLayers layers = drawn({0.7}, {all()});
-  const auto middle = layers.at(kSize.width / 2, kSize.height / 2);
+  const auto middle = layers.at(kIsoPicture.width / 2, kIsoPicture.height / 2);
   ASSERT_EQ(middle.size(), 1u);
-  const glm::dvec3 at = placeAt(kSize.width / 2, kSize.height / 2, double{middle[0].depth});
+  const glm::dvec3 at = placeAt(kIsoPicture.width / 2, kIsoPicture.height / 2, double{middle[0].depth});
   EXPECT_NEAR(glm::length(at), 0.7, 0.003);
   EXPECT_LT(at.x, 0);  // its back, seen from within
 }
@@ -252,8 +253,8 @@ TEST_F(IsoLayersTest, BitsDependNeitherOnThreadsNorOnRangesNorOnMemory) {
   const IsoLayers whole = drawn(values, {all()});
   const std::vector<TileRange> ranges{{0, 2}, {2, 5}, {5, whole.tiles()}};
   const auto expect_same = [&](const IsoLayers& other) {
-    for (int y = 0; y < kSize.height; ++y)
-      for (int x = 0; x < kSize.width; ++x) {
+    for (int y = 0; y < kIsoPicture.height; ++y)
+      for (int x = 0; x < kIsoPicture.width; ++x) {
         const auto a = whole.at(x, y), b = other.at(x, y);
         ASSERT_EQ(a.size(), b.size()) << x << ' ' << y;
         for (size_t n = 0; n < a.size(); ++n)
@@ -277,7 +278,7 @@ TEST_F(IsoLayersTest, BitsDependNeitherOnThreadsNorOnRangesNorOnMemory) {
 
 TEST_F(IsoLayersTest, TooManySplatsForTheMemoryAreReported) {
   setField([](const glm::dvec3& at) { return glm::length(at); });
-  view_ = ScreenView::of(camera_, kSize, glm::dvec3(1), kLowPass, 1e-3);
+  view_ = ScreenView::of(camera_, kIsoPicture, glm::dvec3(1), kLowPass, 1e-3);
   const std::vector<double> values{0.7};
   IsoSplats splats({view_, values, kHalfCellStyle, {}, 0, all(), 10000}, 1);
   const SplatRange every{0, static_cast<uint32_t>(geometry_.size())};

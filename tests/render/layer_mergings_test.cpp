@@ -8,11 +8,11 @@
 namespace curvisplat {
 namespace {
 
-using Value = TransferFunction::Value;
+using FunctionValue = TransferFunction::Value;
 
 /// Grey from black to white, equally opaque everywhere.
 ClassificationTable ramp(double extinction) {
-  return {[=](double f) { return Value{glm::dvec3(f), extinction}; }, 0, 1};
+  return {[=](double f) { return FunctionValue{glm::dvec3(f), extinction}; }, 0, 1};
 }
 
 std::shared_ptr<const LayerMerging> mergingOf(const ClassificationTable& table, double length = 1) {
@@ -60,7 +60,7 @@ TEST(LayerMergings, WhatIsNearlyTransparentIsAlike) {
 
 TEST(LayerMergings, AStepOfTheFunctionDivides) {
   const auto merging = mergingOf({[](double f) {
-                                    return Value{glm::dvec3(0.5), f > 0.5 ? 10.0 : 0.0};
+                                    return FunctionValue{glm::dvec3(0.5), f > 0.5 ? 10.0 : 0.0};
                                   },
                                   0, 1});
   EXPECT_EQ(merging->bins.of(0.1f), merging->bins.of(0.49f));

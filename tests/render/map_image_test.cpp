@@ -34,7 +34,7 @@ glm::vec3 colourAt(double longitude, double latitude) {
   return {((longitude + 180) / 360 * 256 - 0.5) / 255, ((90 - latitude) / 180 * 128 - 0.5) * 2 / 255, 0.2};
 }
 
-void expectNear(const glm::vec3& found, const glm::vec3& expected, float tolerance) {
+void expectColourNear(const glm::vec3& found, const glm::vec3& expected, float tolerance) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], tolerance) << "channel " << c;
 }
 
@@ -42,13 +42,13 @@ TEST(MapImage, HasTheColourOfAPlace) {
   const MapImage map(gradient());
   for (const double longitude : {-170.0, -3.3, 0.0, 88.0, 175.0})
     for (const double latitude : {-80.0, 0.0, 51.25}) {
-      expectNear(map.at(longitude, latitude, 0.1), colourAt(longitude, latitude), 0.003f);
-      expectNear(map.at(longitude + 360, latitude, 0), colourAt(longitude, latitude), 0.003f);
+      expectColourNear(map.at(longitude, latitude, 0.1), colourAt(longitude, latitude), 0.003f);
+      expectColourNear(map.at(longitude + 360, latitude, 0), colourAt(longitude, latitude), 0.003f);
     }
   // At the poles it is that of the last rows; the date line lies between the last and the first column.
-  expectNear(map.at(0, 90, 0), {127.5 / 255, 0, 0.2}, 0.003f);
-  expectNear(map.at(0, -90, 0), {127.5 / 255, 254.0 / 255, 0.2}, 0.003f);
-  expectNear(map.at(180, 0, 0), {127.5 / 255, 127.0 / 255, 0.2}, 0.003f);
+  expectColourNear(map.at(0, 90, 0), {127.5 / 255, 0, 0.2}, 0.003f);
+  expectColourNear(map.at(0, -90, 0), {127.5 / 255, 254.0 / 255, 0.2}, 0.003f);
+  expectColourNear(map.at(180, 0, 0), {127.5 / 255, 127.0 / 255, 0.2}, 0.003f);
 }
 
 TEST(MapImage, AWidePixelSeesTheMean) {
@@ -102,7 +102,7 @@ void expectGlobe(Projection projection, const Globe& globe) {
       if (std::abs(place.x) > 170 || std::abs(place.y) > 75) continue;
       ASSERT_EQ(found.size(), 1U) << x << " " << y;
       EXPECT_EQ(found[0].colour.w, 1);
-      expectNear(glm::vec3(found[0].colour), colourAt(place.x, place.y), 0.006f);
+      expectColourNear(glm::vec3(found[0].colour), colourAt(place.x, place.y), 0.006f);
       ++seen;
     }
   EXPECT_GT(seen, 2000);

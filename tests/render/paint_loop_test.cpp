@@ -24,12 +24,12 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{150, 101};
+constexpr ImageSize kBinnedPicture{150, 101};
 constexpr size_t kManyEntries = 1 << 20;
 
 /// Nearest first, some with records before them.
 std::vector<ScreenSplat> someSplats(int count) {
-  std::vector<ScreenSplat> splats = cutSome(randomSplats(count, 5, kSize), 6);
+  std::vector<ScreenSplat> splats = cutSome(randomSplats(count, 5, kBinnedPicture), 6);
   std::reverse(splats.begin(), splats.end());
   return splats;
 }
@@ -58,10 +58,10 @@ Lists listsByAdding(SplatBins& bins, std::span<const ScreenSplat> splats) {
 TEST(SplatBins, ListsBorrowedSplatsAsThoseThatWereAdded) {
   PaintLoop loop(3, nullptr);
   const auto splats = someSplats(3000);
-  SplatBins one(kSize, splats.size(), kManyEntries, 1);
+  SplatBins one(kBinnedPicture, splats.size(), kManyEntries, 1);
   const Lists expected = listsByAdding(one, splats);
   for (const unsigned pieces : {1u, 2u, 7u}) {
-    SplatBins bins(kSize, splats.size(), kManyEntries, pieces);
+    SplatBins bins(kBinnedPicture, splats.size(), kManyEntries, pieces);
     EXPECT_EQ(bins.sortBorrowed(splats, loop), splats.size());
     EXPECT_EQ(bins.splats().data(), splats.data()) << "a copy";
     Lists lists;
@@ -77,11 +77,11 @@ TEST(SplatBins, ListsBorrowedSplatsAsThoseThatWereAdded) {
 TEST(SplatBins, BorrowsNoMoreThanThereIsSpaceFor) {
   PaintLoop loop(3, nullptr);
   const auto splats = someSplats(3000);
-  SplatBins all(kSize, splats.size(), kManyEntries, 1);
+  SplatBins all(kBinnedPicture, splats.size(), kManyEntries, 1);
   const Lists expected = listsByAdding(all, splats);
   for (const auto& [most_splats, most_entries] :
        {std::pair<size_t, size_t>{100, kManyEntries}, {1, kManyEntries}, {5000, 150}}) {
-    SplatBins bins(kSize, most_splats, most_entries, 3);
+    SplatBins bins(kBinnedPicture, most_splats, most_entries, 3);
     Lists lists;
     int batches = 0;
     for (std::span<const ScreenSplat> left = splats; !left.empty(); ++batches) {
@@ -107,7 +107,7 @@ TEST(SplatBins, LeavesRecordsAtTheEndToBeAddedWithTheirSplat) {
   const auto last = std::find_if(splats.rbegin(), splats.rend(), isRecord);
   ASSERT_NE(last, splats.rend());
   const auto end = static_cast<size_t>(splats.rend() - last);  // behind that record
-  SplatBins bins(kSize, splats.size(), kManyEntries, 2);
+  SplatBins bins(kBinnedPicture, splats.size(), kManyEntries, 2);
   const size_t taken = bins.sortBorrowed(std::span(splats).first(end), loop);
   EXPECT_LT(taken, end);
   bins.clear();
@@ -124,7 +124,7 @@ TEST(SplatBins, CountsSplatsOfClosedTilesAsHidden) {
   std::vector<ScreenSplat> splats(
       50, {16, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});  // in the first tile
   splats.resize(80, {3 * kTileSide + 5, 16, 1, 0, 1, 1, 0.5f, 0, 0, 0, 0, 0, 0, 0, 0, 0});
-  SplatBins bins(kSize, splats.size(), kManyEntries, 2);
+  SplatBins bins(kBinnedPicture, splats.size(), kManyEntries, 2);
   bins.close(0);
   EXPECT_EQ(bins.sortBorrowed(splats, loop), splats.size());
   EXPECT_EQ(bins.hidden(), 50u);

@@ -377,7 +377,7 @@ TEST(GlPainter, RefusesAnImageBeyondTheLimitAndGoesOn) {
 }
 
 /// Splats that lean, some cut, in the order of their first keys.
-std::vector<ScreenSplat> leaning(int count, ImageSize size, float opacity = 0.5f) {
+std::vector<ScreenSplat> leaningAndCut(int count, ImageSize size, float opacity = 0.5f) {
   std::vector<std::vector<ScreenSplat>> placed;  // each behind its records, which cutSome() has behind it
   std::mt19937 random(5);
   std::uniform_real_distribution<float> around(-1, 1);
@@ -411,7 +411,7 @@ Image drawn(Painter& painter, std::span<const ScreenSplat> nearest_first, const 
 TEST(CpuPainter, HasTheSameBitsWhateverIsKeptOfPreparedSplats) {
   const ImageSize size{kTileSide, kTileSide};
   const auto table = lively();
-  const auto splats = leaning(6000, size, 0.002f);
+  const auto splats = leaningAndCut(6000, size, 0.002f);
   const auto painted = [&](size_t waiting_splats) {
     Image image;
     makeBackend(Backend::kCpu)->run([&](Painter& painter) {
@@ -430,8 +430,8 @@ TEST(CpuPainter, HasTheSameBitsWhenThreadsShareATile) {
   const ImageSize size{2 * kTileSide + 9, kTileSide};
   const auto table = lively();
   for (const float opacity : {0.002f, 0.5f}) {  // of the latter much is hidden
-    auto splats = leaning(300, size, opacity);
-    const auto of_tile = leaning(12000, {kTileSide, kTileSide}, opacity);
+    auto splats = leaningAndCut(300, size, opacity);
+    const auto of_tile = leaningAndCut(12000, {kTileSide, kTileSide}, opacity);
     splats.insert(splats.end(), of_tile.begin(), of_tile.end());
     std::vector<std::vector<ScreenSplat>> placed(1);  // each behind its records
     for (const ScreenSplat& splat : splats) {
@@ -464,7 +464,7 @@ TEST(CpuPainter, HasTheSameBitsWhenThreadsShareATile) {
 TEST(GlTilePainter, HasTheSameBitsInAnyBatchesAndBoxes) {
   const ImageSize size{70, 50};
   const auto table = lively();
-  const auto splats = leaning(250, size);
+  const auto splats = leaningAndCut(250, size);
   Image expected;
   makeBackend(Backend::kCpu)->run([&](Painter& painter) { expected = drawn(painter, splats, table, size); });
   GlThread gl(GlLibrary::kEgl);
@@ -510,7 +510,7 @@ TEST(GlTilePainter, CountsTheLayersAsMemoryOfTheCard) {
     const auto bytesWith = [&](const PixelLayers* of_pixels) {
       GlTilePainter painter(context);
       painter.begin(size, kWhite, table, {.layers = of_pixels});
-      painter.draw(leaning(250, size));
+      painter.draw(leaningAndCut(250, size));
       painter.end();
       return painter.cardWork().bytes;
     };
@@ -522,7 +522,7 @@ TEST(GlTilePainter, CountsTheLayersAsMemoryOfTheCard) {
 TEST(GlTilePainter, DrawsRegionsAsTheWhole) {
   const ImageSize size{70, 50};
   const auto table = lively();
-  const auto splats = leaning(300, size);
+  const auto splats = leaningAndCut(300, size);
   std::vector<uint32_t> owners(TileSet::tilesOf(size, kSharedTileSide), 1);
   for (size_t n = 0; n < owners.size(); ++n) owners[n] = n % 9 >= 5;  // 40 of 70 pixels
   GlThread gl(GlLibrary::kEgl);

@@ -117,7 +117,7 @@ Camera randomCamera(Random& random, Projection projection) {
   return camera;
 }
 
-constexpr ImageSize kSize{4000, 3000};  // the least low-pass, 0.01 px², is next to nothing then
+constexpr ImageSize kLargePicture{4000, 3000};  // the least low-pass, 0.01 px², is next to nothing then
 constexpr double kMinLowPass = 0.01;
 
 // The optical depth of a ray through a pixel that meets the splat must be what the screen splat says.
@@ -127,7 +127,7 @@ void checkOpticalDepths(Projection projection, double size, double tolerance) {
     const glm::dvec3 scale = n % 2 ? glm::dvec3(1, 1, 1) : glm::dvec3(0.7, 1.3, 2);
     const TestSplat splat = random.splat(size, 8, glm::dvec3(0));
     const ProjectionSettings settings{
-        ScreenView::of(randomCamera(random, projection), kSize, scale, kMinLowPass, 1e-3)};
+        ScreenView::of(randomCamera(random, projection), kLargePicture, scale, kMinLowPass, 1e-3)};
     const ScreenView& view = settings.view;
     const ScreenSplat drawn = projectOne(splat, settings, {-0.3, -0.2, -0.4});
     const double peak = drawn.amplitude * footprint(0);
@@ -136,7 +136,8 @@ void checkOpticalDepths(Projection projection, double size, double tolerance) {
       const glm::dvec2 u = rho * glm::dvec2(std::cos(angle), std::sin(angle));
       const glm::dvec2 d(drawn.l11 * u.x, drawn.l21 * u.x + drawn.l22 * u.y);
       const glm::dvec2 from_middle =
-          (glm::dvec2(drawn.x, drawn.y) + d - 0.5 * glm::dvec2(kSize.width, kSize.height)) / view.focal_px;
+          (glm::dvec2(drawn.x, drawn.y) + d - 0.5 * glm::dvec2(kLargePicture.width, kLargePicture.height)) /
+          view.focal_px;
       const glm::dvec3 across = from_middle.x * view.right + from_middle.y * view.down;
       const bool perspective = projection == Projection::kPerspective;
       const double depth = integralAlong(splat, scale, perspective ? view.eye : view.eye + across,
@@ -188,8 +189,8 @@ TEST(Projection, MeanAndDeviationFollowTheDesign) {
     for (int n = 0; n < 500; ++n) {
       const glm::dvec3 scale = n % 2 ? glm::dvec3(1, 1, 1) : glm::dvec3(0.7, 1.3, 2);
       const TestSplat splat = random.splat(n % 3 ? 0.05 : 0.002, 20, glm::dvec3(0));
-      const ProjectionSettings settings{
-          ScreenView::of(randomCamera(random, Projection::kOrthographic), kSize, scale, low_pass, 1e-3)};
+      const ProjectionSettings settings{ScreenView::of(randomCamera(random, Projection::kOrthographic),
+                                                       kLargePicture, scale, low_pass, 1e-3)};
       const ScreenView& view = settings.view;
       expectConditioned(projectOne(splat, settings, {-0.3, -0.2, -0.4}),
                         condition(splat, view, view.focal_px * view.right, view.focal_px * view.down), 2e-4);
@@ -202,8 +203,8 @@ TEST(Projection, StaysExactForPencilsAndSheets) {
   for (const double aspect : {1e3, 1e5})
     for (int n = 0; n < 500; ++n) {
       const TestSplat splat = random.splat(0.3, aspect, glm::dvec3(0));
-      const ProjectionSettings settings{
-          ScreenView::of(randomCamera(random, Projection::kOrthographic), kSize, glm::dvec3(1), 1.5, 1e-3)};
+      const ProjectionSettings settings{ScreenView::of(randomCamera(random, Projection::kOrthographic),
+                                                       kLargePicture, glm::dvec3(1), 1.5, 1e-3)};
       const ScreenView& view = settings.view;
       const ScreenSplat drawn = projectOne(splat, settings, {-0.3, -0.2, -0.4});
       const glm::dvec3 row0 = view.focal_px * view.right, row1 = view.focal_px * view.down;
@@ -227,7 +228,8 @@ TEST(Projection, ThinSplatsLeanAsTheirPlanesDo) {
     const glm::dvec3 scale = n % 2 ? glm::dvec3(1, 1, 1) : glm::dvec3(0.7, 1.3, 2);
     const Projection projection = n % 5 < 3 ? Projection::kOrthographic : Projection::kPerspective;
     const TestSplat splat = random.splat(n % 3 ? 0.05 : 0.002, n % 7 ? 30 : 1000, glm::dvec3(0));
-    ProjectionSettings settings{ScreenView::of(randomCamera(random, projection), kSize, scale, 1.5, 1e-3)};
+    ProjectionSettings settings{
+        ScreenView::of(randomCamera(random, projection), kLargePicture, scale, 1.5, 1e-3)};
     if (n % 4 == 0) settings.clip_planes = {{splat.splat.position, random.direction()}};
     const ScreenView& view = settings.view;
     const glm::dvec3 at = view.viewFromData(splat.splat.position);
@@ -269,8 +271,8 @@ TEST(Projection, PencilsLeanAlongThemselves) {
     splat.splat.shear = {random.in(-1, 1), random.in(-1, 1), 0};
     splat.splat.weight = 1e-6;
     splat.scalar = {0.5, {0, 0, 0}, 0};
-    const ProjectionSettings settings{
-        ScreenView::of(randomCamera(random, Projection::kOrthographic), kSize, glm::dvec3(1), 1.5, 1e-3)};
+    const ProjectionSettings settings{ScreenView::of(randomCamera(random, Projection::kOrthographic),
+                                                     kLargePicture, glm::dvec3(1), 1.5, 1e-3)};
     const ScreenView& view = settings.view;
     const glm::dvec3 along = view.focal_px * splat.splat.factor()[0];
     const glm::dvec2 on_screen(glm::dot(view.right, along), glm::dot(view.down, along));
@@ -289,7 +291,7 @@ TEST(Projection, WhatAPlaneLeavesHidesLessOfItself) {
   Random random(13);
   for (int n = 0; n < 200; ++n) {
     const TestSplat splat = random.splat(0.05, 5, glm::dvec3(0));
-    ProjectionSettings settings{ScreenView::of(randomCamera(random, Projection::kOrthographic), kSize,
+    ProjectionSettings settings{ScreenView::of(randomCamera(random, Projection::kOrthographic), kLargePicture,
                                                glm::dvec3(1), kMinLowPass, 1e-3)};
     const ScreenView& view = settings.view;
     const glm::dmat3 a = glm::transpose(glm::dmat3(view.right, view.down, view.forward)) *
@@ -390,8 +392,8 @@ TEST(Projection, DepthOrdersAlongTheViewAndFromTheEye) {
   for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
     camera.projection = projection;
     BrickProjector projector;
-    projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3)}, opaque(), {-1, -1, -1},
-                      geometry, variable);
+    projector.project({ScreenView::of(camera, kLargePicture, glm::dvec3(1), 1.5, 1e-3)}, opaque(),
+                      {-1, -1, -1}, geometry, variable);
     ASSERT_EQ(projector.depths().size(), 3u);
     const auto& depths = projector.depths();
     const double farther = projection == Projection::kOrthographic ? 0.1 : 1 / 2.0 - 1 / 2.1;
@@ -427,8 +429,9 @@ TEST(Projection, CountsWhatItLeavesOut) {
   camera.projection = Projection::kPerspective;
   const WorldBox clip{{-20, -5, -20}, {20, 5, 20}};
   BrickProjector projector;
-  projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true, clipPlanesOf({}, clip)},
-                    table, glm::dvec3(-1), geometry, variable);
+  projector.project(
+      {ScreenView::of(camera, kLargePicture, glm::dvec3(1), 1.5, 1e-3), true, clipPlanesOf({}, clip)}, table,
+      glm::dvec3(-1), geometry, variable);
   EXPECT_EQ(projector.counts().read, 6u);
   EXPECT_EQ(projector.counts().drawn, 1u);
   EXPECT_EQ(projector.counts().transparent, 2u);
@@ -456,8 +459,8 @@ TEST(Projection, DrawsFlatWhatHasNoFiniteReach) {
   Camera camera;
   camera.position = {0, 0, 2};
   BrickProjector projector;
-  projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true}, table, glm::dvec3(-1),
-                    geometry, variable);
+  projector.project({ScreenView::of(camera, kLargePicture, glm::dvec3(1), 1.5, 1e-3), true}, table,
+                    glm::dvec3(-1), geometry, variable);
   ASSERT_EQ(projector.splats().size(), 2u);
   for (const ScreenSplat& drawn : projector.splats()) {
     EXPECT_LT(drawn.mean, -1e24f);
@@ -476,7 +479,7 @@ TEST(Projection, LeavesNothingOutThatCanBeSeen) {
       },
       0, 1);
   const Camera camera = randomCamera(random, Projection::kOrthographic);
-  const ProjectionSettings settings{ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3)};
+  const ProjectionSettings settings{ScreenView::of(camera, kLargePicture, glm::dvec3(1), 1.5, 1e-3)};
   int left_out = 0;
   for (int n = 0; n < 2000; ++n) {
     const TestSplat splat = random.splat(n % 2 ? 0.02 : 0.0005, 20, glm::dvec3(0));

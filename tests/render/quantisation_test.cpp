@@ -21,7 +21,7 @@ namespace curvisplat {
 namespace {
 
 constexpr ImageSize kSize{256, 256};
-constexpr SceneGridSize kNodes{96, 48, 48};
+constexpr SceneGridSize kSceneNodes{96, 48, 48};
 
 struct Splats {
   SplatGeometry geometry;
@@ -45,8 +45,8 @@ Splats inArrays(const RootCube& root, const BrickSplats& brick) {
 
 /// The half-annulus' splats, in bricks of planes of nodes; every brick's cell is the root.
 std::vector<BrickSplats> halfAnnulusBricks(RootCube& root) {
-  const SceneGridSource source(makeScene("half-annulus"), kNodes);
-  const NodeBox all{0, kNodes.nj, 0, kNodes.nk};
+  const SceneGridSource source(makeScene("half-annulus"), kSceneNodes);
+  const NodeBox all{0, kSceneNodes.nj, 0, kSceneNodes.nk};
   NodeArrays nodes;
   const uint32_t scalar = 0;
   source.read(0, all, std::span(&scalar, 1), nodes);
@@ -60,11 +60,11 @@ std::vector<BrickSplats> halfAnnulusBricks(RootCube& root) {
 
   std::vector<BrickSplats> bricks;
   const BlockWindow window{source.description().blocks[0], 0, all, &nodes};
-  const uint64_t planes = kMaxBrickSplats / (kNodes.ni * kNodes.nj);
+  const uint64_t planes = kMaxBrickSplats / (kSceneNodes.ni * kSceneNodes.nj);
   NodeScratch scratch;
   NodeSplats splats;
-  for (uint64_t k = 0; k < kNodes.nk; k += planes) {
-    computeNodeSplats(window, {0, kNodes.nj, k, std::min(k + planes, kNodes.nk)}, scratch, splats);
+  for (uint64_t k = 0; k < kSceneNodes.nk; k += planes) {
+    computeNodeSplats(window, {0, kSceneNodes.nj, k, std::min(k + planes, kSceneNodes.nk)}, scratch, splats);
     BrickSplats& brick = bricks.emplace_back();
     brick.variables.resize(1);
     brick.variables[0] = splats.values;
@@ -74,8 +74,8 @@ std::vector<BrickSplats> halfAnnulusBricks(RootCube& root) {
       brick.border_codes.push_back(node.border_code);
       brick.growth_codes.push_back(node.growth_code);
     }
-    for (uint64_t row = 0; row < splats.splats.size() / kNodes.ni; ++row)
-      brick.runs.push_back({0, 0, row % kNodes.nj, k + row / kNodes.nj, kNodes.ni});
+    for (uint64_t row = 0; row < splats.splats.size() / kSceneNodes.ni; ++row)
+      brick.runs.push_back({0, 0, row % kSceneNodes.nj, k + row / kSceneNodes.nj, kSceneNodes.ni});
   }
   return bricks;
 }
@@ -130,9 +130,10 @@ class Quantisation : public testing::Test {
       bytes += encoded.geometry.size() + encoded.values[0].size();
     }
     const double decoded_db = compareImages(paint(root, bricks, table), reference).psnr_db;
-    fmt::print("{}: {:.2f} dB as computed, {:.2f} dB through the codec, {:.2f} bytes a splat\n", name,
-               computed_db, decoded_db,
-               static_cast<double>(bytes) / static_cast<double>(kNodes.ni * kNodes.nj * kNodes.nk));
+    fmt::print(
+        "{}: {:.2f} dB as computed, {:.2f} dB through the codec, {:.2f} bytes a splat\n", name, computed_db,
+        decoded_db,
+        static_cast<double>(bytes) / static_cast<double>(kSceneNodes.ni * kSceneNodes.nj * kSceneNodes.nk));
     EXPECT_GT(computed_db, 50);
     EXPECT_LT(computed_db - decoded_db, 1);
   }

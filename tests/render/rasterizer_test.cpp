@@ -21,7 +21,7 @@ namespace curvisplat {
 namespace {
 
 // Neither side is a multiple of a tile's.
-constexpr ImageSize kSize{300, 70};
+constexpr ImageSize kUnevenPicture{300, 70};
 
 Camera cameraOf(Projection projection) {
   Camera camera;
@@ -101,7 +101,8 @@ class Rasterizer : public testing::TestWithParam<Projection> {};
 
 TEST_P(Rasterizer, SeesWhatIsNearestAtEverySample) {
   const SurfaceScene scene = randomScene(GetParam() == Projection::kPerspective ? 5.5 : 3);
-  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ScreenView view =
+      ScreenView::of(cameraOf(GetParam()), kUnevenPicture, glm::dvec3(1.0), kLowPass, 0.1);
   const SceneTriangles triangles(scene, view, 0);
   const TriangleBins bins(triangles);
   size_t nothing = 0, compared = 0;
@@ -160,7 +161,7 @@ TEST_P(Rasterizer, SeesWhatIsNearestAtEverySample) {
       EXPECT_EQ(wrong, 0u) << "tile " << column << ", " << row;
     }
   EXPECT_GT(nothing, 1000u);
-  EXPECT_GT(compared, kSamples * kSize.pixels() / 2);
+  EXPECT_GT(compared, kSamples * kUnevenPicture.pixels() / 2);
 }
 
 /// A line of the points.
@@ -200,7 +201,8 @@ double distanceTo(const std::vector<glm::vec3>& ends, const glm::dvec3& origin, 
 TEST_P(Rasterizer, TheLayersAreTheSameForAnyThreads) {
   SurfaceScene scene = randomScene(GetParam() == Projection::kPerspective ? 5.5 : 3);
   scene.curves = randomCurves(20).curves;
-  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ScreenView view =
+      ScreenView::of(cameraOf(GetParam()), kUnevenPicture, glm::dvec3(1.0), kLowPass, 0.1);
   const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
   const SceneLook look{colours, {}, {}, 0};
   const auto drawn = [&](int threads) {
@@ -209,8 +211,8 @@ TEST_P(Rasterizer, TheLayersAreTheSameForAnyThreads) {
   };
   const PixelLayers one = drawn(1), two = drawn(2);
   size_t layers = 0;
-  for (int y = 0; y < kSize.height; ++y)
-    for (int x = 0; x < kSize.width; ++x) {
+  for (int y = 0; y < kUnevenPicture.height; ++y)
+    for (int x = 0; x < kUnevenPicture.width; ++x) {
       const auto a = one.at(x, y), b = two.at(x, y);
       ASSERT_EQ(a.size(), b.size());
       layers += a.size();
@@ -266,7 +268,8 @@ TEST_P(Rasterizer, SeesCapsulesWhereRaysThatStepByDistanceMeetThem) {
 TEST_P(Rasterizer, TheOrderOfCapsulesDoesNotMatter) {
   SurfaceScene scene = randomCurves(3000), reversed = scene;
   std::reverse(reversed.curves.begin(), reversed.curves.end());
-  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ScreenView view =
+      ScreenView::of(cameraOf(GetParam()), kUnevenPicture, glm::dvec3(1.0), kLowPass, 0.1);
   const SceneTriangles triangles(scene, view, 0), others(reversed, view, 0);
   const TriangleBins bins(triangles), other_bins(others);
   SampleTile tile, other;
@@ -312,12 +315,13 @@ TEST_P(Rasterizer, ATranslucentTubeIsOneLayer) {
   SurfaceScene scene;
   scene.curves.push_back(lineOf(arc, 0.2));
   scene.curves.back().opacity = 0.5;
-  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ScreenView view =
+      ScreenView::of(cameraOf(GetParam()), kUnevenPicture, glm::dvec3(1.0), kLowPass, 0.1);
   const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
   const PixelLayers layers = layersOf(scene, view, {}, {colours, {}, {}, 0});
   size_t whole = 0, several = 0;
-  for (int y = 0; y < kSize.height; ++y)
-    for (int x = 0; x < kSize.width; ++x) {
+  for (int y = 0; y < kUnevenPicture.height; ++y)
+    for (int x = 0; x < kUnevenPicture.width; ++x) {
       const auto at = layers.at(x, y);
       whole += at.size() == 1 && at[0].colour.w == 0.5f;
       several += at.size() > 1;
@@ -335,11 +339,13 @@ TEST_P(Rasterizer, TranslucentPointsNearOneAnotherAreLayersOfTheirOwn) {
   scene.curves[0].set = std::make_shared<CurveSet>(pointsOf(*scene.curves[0].set));
   scene.curves.push_back(lineOf({{0, 0, 0}}, 0.4));
   for (Curves& curves : scene.curves) curves.opacity = 0.25;
-  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ScreenView view =
+      ScreenView::of(cameraOf(GetParam()), kUnevenPicture, glm::dvec3(1.0), kLowPass, 0.1);
   const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
   const PixelLayers layers = layersOf(scene, view, {}, {colours, {}, {}, 0});
   float through = 1;
-  for (const PixelLayer& layer : layers.at(kSize.width / 2, kSize.height / 2)) through *= 1 - layer.colour.w;
+  for (const PixelLayer& layer : layers.at(kUnevenPicture.width / 2, kUnevenPicture.height / 2))
+    through *= 1 - layer.colour.w;
   EXPECT_NEAR(through, std::pow(0.75, 6), 1e-5);
 }
 
@@ -419,7 +425,8 @@ TEST_P(Rasterizer, DrawsThePointsAtWhichALineOrItsValuesTurn) {
   for (int n = 0; n <= 1000; ++n) with_values.values.push_back(static_cast<float>(std::min(n, 200)));
   scene.curves.push_back(scene.curves[0]);
   scene.curves[1].set = std::make_shared<CurveSet>(with_values);
-  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ScreenView view =
+      ScreenView::of(cameraOf(GetParam()), kUnevenPicture, glm::dvec3(1.0), kLowPass, 0.1);
   const SceneTriangles triangles(scene, view, 0);
   const auto pointsOf = [&](size_t curve) {
     std::vector<uint32_t> points;
@@ -451,7 +458,8 @@ TEST_P(Rasterizer, ChordsPassAllPointsClosely) {
   CurveSet set = *scene.curves[0].set;
   for (int n = 0; n < kPoints; ++n) set.values.push_back(static_cast<float>(std::sin(0.004 * n)));
   scene.curves[0].set = std::make_shared<CurveSet>(set);
-  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ScreenView view =
+      ScreenView::of(cameraOf(GetParam()), kUnevenPicture, glm::dvec3(1.0), kLowPass, 0.1);
   const SceneTriangles triangles(scene, view, 0);
   const bool perspective = GetParam() == Projection::kPerspective;
   size_t chords = 0;

@@ -17,7 +17,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kSplats = 65536;
-constexpr uint32_t kParts = 40, kRanks = 2;
+constexpr uint32_t kExchangedParts = 40, kRanks = 2;
 
 /// A picture of 64x64 pixels, whose left half is rank 0's.
 SharedParts twoHalves() {
@@ -27,7 +27,7 @@ SharedParts twoHalves() {
   const int side = TileSet::tilesAlong(64, kSharedTileSide);
   for (int y = 0; y < side; ++y)
     for (int x = 0; x < side; ++x) shared.owners.push_back(x < side / 2 ? 0 : 1);
-  for (uint32_t n = 0; n < kParts; ++n) {
+  for (uint32_t n = 0; n < kExchangedParts; ++n) {
     shared.parts.push_back({{n}, {n, n}});
     shared.preparers.push_back(n % kRanks);
   }
@@ -62,7 +62,7 @@ TEST(SplatExchange, HoldsNoMoreThanItsBuffers) {
     SplatExchange exchange(ranks, shared, buffer);
     const int half = TileSet::tilesAlong(64, kSharedTileSide) / 2, first = ranks.rank() == 0 ? 0 : half;
     SplatExchange::Request request{{first, 0, first + half, 2 * half}, {}};
-    for (uint32_t n = 0; n < kParts; ++n) request.parts.push_back(n);
+    for (uint32_t n = 0; n < kExchangedParts; ++n) request.parts.push_back(n);
     ASSERT_TRUE(exchange.beginSlab(request));
     while (exchange.step([](uint64_t) { return false; })) {
       while (const auto sequence = exchange.nextReceived())
@@ -72,7 +72,7 @@ TEST(SplatExchange, HoldsNoMoreThanItsBuffers) {
     }
   });
   for (uint32_t rank = 0; rank < kRanks; ++rank) {
-    EXPECT_GT(received[rank], kParts * kSplats / 2);
+    EXPECT_GT(received[rank], kExchangedParts * kSplats / 2);
     EXPECT_LT(most[rank] - before, kRanks * 3 * buffer);
   }
 }
@@ -81,7 +81,7 @@ TEST(SplatExchange, HoldsNoMoreThanItsBuffers) {
 TEST(SplatExchange, PreparesInRounds) {
   SharedParts shared = twoHalves();
   shared.elements = 4;
-  const std::vector<size_t> ends = roundEnds(kParts, kRanks);
+  const std::vector<size_t> ends = roundEnds(kExchangedParts, kRanks);
   ASSERT_GT(ends.size(), 2u);
   const std::vector<ScreenSplat> splats = {splatsOfAPart()[0]};
   const std::vector<uint32_t> keys = {0};
@@ -90,7 +90,7 @@ TEST(SplatExchange, PreparesInRounds) {
     SplatExchange exchange(ranks, shared, 1 << 20);
     const int half = TileSet::tilesAlong(64, kSharedTileSide) / 2, first = ranks.rank() == 0 ? 0 : half;
     SplatExchange::Request request{{first, 0, first + half, 2 * half}, {}};
-    for (uint32_t n = 0; n < kParts; ++n) request.parts.push_back(n);
+    for (uint32_t n = 0; n < kExchangedParts; ++n) request.parts.push_back(n);
     ASSERT_TRUE(exchange.beginSlab(request));
     while (exchange.step([](uint64_t) { return false; })) {
       while (const auto sequence = exchange.nextReceived()) exchange.received(*sequence);

@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-ScreenSplat numbered(size_t number) {
+ScreenSplat numberedSplat(size_t number) {
   ScreenSplat splat{};
   splat.x = static_cast<float>(number);
   return splat;
@@ -36,7 +36,7 @@ TEST(SegmentRing, HandsOverEverythingInSequence) {
           const auto segment = ring.acquire(sequence, counts[sequence]);
           ASSERT_TRUE(segment);
           ASSERT_EQ(segment->size(), counts[sequence]);
-          for (ScreenSplat& splat : *segment) splat = numbered(sequence);
+          for (ScreenSplat& splat : *segment) splat = numberedSplat(sequence);
           ring.commit(sequence);
         }
       });
@@ -57,7 +57,7 @@ TEST(SegmentRing, KeepsWhatIsHandedOutUntilItIsReleased) {
   const auto fill = [&](uint64_t sequence, size_t count) {
     const auto segment = ring.acquire(sequence, count);
     ASSERT_TRUE(segment);
-    for (ScreenSplat& splat : *segment) splat = numbered(sequence);
+    for (ScreenSplat& splat : *segment) splat = numberedSplat(sequence);
     ring.commit(sequence);
   };
   EXPECT_FALSE(ring.nextIfReady());
@@ -172,12 +172,12 @@ TEST(SegmentDrawer, GivesBackWhatIsDrawnAndNeverStarvesTheWorkers) {
 constexpr size_t kPage = SweepBuffer::kPageSplats;
 
 /// Parts of random extent along the depth, and their splats' keys in index order.
-struct Scene {
+struct SweptScene {
   std::vector<SweptPart> parts;
   std::vector<std::vector<uint32_t>> keys;  // [part]
 
   /// A scene of `values` different keys; few make long ties.
-  Scene(uint64_t seed, uint32_t count, uint32_t most_splats, uint32_t values) {
+  SweptScene(uint64_t seed, uint32_t count, uint32_t most_splats, uint32_t values) {
     std::mt19937_64 random(seed);
     for (uint32_t n = 0; n < count; ++n) {
       SweptPart part{{n}, {}};
@@ -220,7 +220,7 @@ struct Scene {
 /// Sweeps as a frame's workers do, and collects what comes out.
 class Sweeper {
  public:
-  Sweeper(const Scene& scene, size_t splats, size_t batch) : scene_(scene), buffer_(splats, batch) {}
+  Sweeper(const SweptScene& scene, size_t splats, size_t batch) : scene_(scene), buffer_(splats, batch) {}
 
   std::vector<std::pair<float, float>> sweep(int workers) {
     buffer_.beginFrame();
@@ -285,7 +285,7 @@ class Sweeper {
     batches_[batch.sequence] = std::move(splats);
   }
 
-  const Scene& scene_;
+  const SweptScene& scene_;
   SweepBuffer buffer_;
   std::atomic<uint64_t> next_ = 0;
   std::mutex mutex_;
@@ -295,7 +295,7 @@ class Sweeper {
 TEST(SweepBuffer, HandsOutAllSplatsInOrderWhateverItsSize) {
   for (const auto& [values, most_splats] :
        {std::pair{1u << 30, 1000u}, std::pair{50u, 600u}, std::pair{1u, 1500u}}) {
-    const Scene scene(7, 40, most_splats, values);
+    const SweptScene scene(7, 40, most_splats, values);
     const auto expected = scene.inOrder();
     uint64_t last_slabs = 1;
     for (const size_t pages : {2000u, 200u, 40u, 4u}) {
@@ -316,7 +316,7 @@ TEST(SweepBuffer, HandsOutAllSplatsInOrderWhateverItsSize) {
 
 TEST(SweepBuffer, HoldsALayerOnly) {
   // A hundred parts one behind the other, overlapping by half.
-  Scene scene(1, 0, 0, 1);
+  SweptScene scene(1, 0, 0, 1);
   std::mt19937 random(2);
   for (uint32_t n = 0; n < 100; ++n) {
     scene.parts.push_back({{n}, {n * 1000, n * 1000 + 1999}});
@@ -330,7 +330,7 @@ TEST(SweepBuffer, HoldsALayerOnly) {
 
 // Painting threads wait for one another at the end of each.
 TEST(SweepBuffer, FillsBatches) {
-  const Scene scene(11, 200, 2000, 1u << 30);
+  const SweptScene scene(11, 200, 2000, 1u << 30);
   const auto order = scene.inOrder();
   constexpr size_t kBatch = 10'000;
   Sweeper sweeper(scene, 2 * order.size(), kBatch);
@@ -341,7 +341,7 @@ TEST(SweepBuffer, FillsBatches) {
 }
 
 TEST(SweepBuffer, ClosingWakesAllWhoWait) {
-  const Scene scene(3, 10, 1000, 100);
+  const SweptScene scene(3, 10, 1000, 100);
   SweepBuffer buffer(8 * kPage, 100);
   ASSERT_TRUE(buffer.beginSlab(scene.parts));
   std::thread early([&] { EXPECT_FALSE(buffer.awaitTurn(3)); });

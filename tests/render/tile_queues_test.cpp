@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{100, 70};
+constexpr ImageSize kTiledPicture{100, 70};
 
 constexpr float kReach = ScreenCut::kReach;
 
@@ -92,7 +92,7 @@ void divideNone(TileQueues&, size_t) {}
 /// `divide_some` is called before each batch, with its number.
 Orders ordersOf(TileQueues& queues, std::span<const ScreenSplat> splats, const std::vector<size_t>& batches,
                 const std::function<void(TileQueues&, size_t)>& divide_some = divideNone) {
-  SplatBins bins(kSize, 4096, 4 * 4096, 2);
+  SplatBins bins(kTiledPicture, 4096, 4 * 4096, 2);
   PaintLoop loop(2, nullptr);
   queues.clear();
   Orders orders;
@@ -173,8 +173,8 @@ bool touches(const ScreenSplat& splat, float x, float y) {
 /// The orders that a tile's list must have.
 Orders specifiedFor(std::span<const ScreenSplat> splats) {
   Orders orders;
-  const int columns = TileSet::tilesAlong(kSize.width);
-  for (size_t number = 0; number < TileSet::tilesOf(kSize); ++number)
+  const int columns = TileSet::tilesAlong(kTiledPicture.width);
+  for (size_t number = 0; number < TileSet::tilesOf(kTiledPicture); ++number)
     for (size_t of_tile = 0; of_tile < kOrderTiles; ++of_tile) {
       const float x = static_cast<float>(static_cast<int>(number) % columns * kTileSide +
                                          static_cast<int>(of_tile) % kOrderTilesAlong * kOrderSide);
@@ -205,7 +205,7 @@ void expectOrders(const Orders& found, const Orders& specified) {
 TEST(TileQueues, GiveEachTileItsOwnOrderHoweverSplatsAreBatched) {
   const auto splats = leaningSplats(1500, 3);
   const Orders specified = specifiedFor(splats);
-  TileQueues queues(kSize, 1 << 16, 2);
+  TileQueues queues(kTiledPicture, 1 << 16, 2);
   expectOrders(ordersOf(queues, splats, {}), specified);
   expectOrders(ordersOf(queues, splats, std::vector<size_t>(50, 40)), specified);
   expectOrders(ordersOf(queues, splats, {1, 2, 3, 500, 7, 300, 300}), specified);
@@ -219,18 +219,19 @@ TEST(TileQueues, KeepEachOrderTilesOrderWhenTilesAreDivided) {
   for (const bool lean : {true, false}) {
     const Orders specified = specifiedFor(splats);
     for (const auto& batches : {std::vector<size_t>(50, 40), std::vector<size_t>{700, 700}, {}}) {
-      TileQueues queues(kSize, kSplats, 2);
+      TileQueues queues(kTiledPicture, kSplats, 2);
       // At first all tiles; then every third of the parts, and those again.
       const auto divide_some = [&](TileQueues& of, size_t batch) {
         for (size_t queue = 0, count = of.size(); queue < count; ++queue)
-          if (batch == 0 || (queue >= TileSet::tilesOf(kSize) && (queue + batch) % 3 == 0)) divide(of, queue);
+          if (batch == 0 || (queue >= TileSet::tilesOf(kTiledPicture) && (queue + batch) % 3 == 0))
+            divide(of, queue);
       };
       expectOrders(ordersOf(queues, splats, batches, divide_some), specified);
       EXPECT_FALSE(queues.isFull());
       EXPECT_FALSE(queues.anyWaits());
-      EXPECT_GE(queues.size(), TileSet::tilesOf(kSize) * (1 + TileQueues::kParts));
+      EXPECT_GE(queues.size(), TileSet::tilesOf(kTiledPicture) * (1 + TileQueues::kParts));
       expectOrders(ordersOf(queues, splats, batches), specified);
-      EXPECT_EQ(queues.size(), TileSet::tilesOf(kSize)) << "after clear()";
+      EXPECT_EQ(queues.size(), TileSet::tilesOf(kTiledPicture)) << "after clear()";
     }
     for (ScreenSplat& splat : splats)
       if (lean && !isRecord(splat)) splat.key_slope0 = splat.key_slope1 = 0, splat.key = splat.first;
@@ -238,7 +239,7 @@ TEST(TileQueues, KeepEachOrderTilesOrderWhenTilesAreDivided) {
 }
 
 TEST(TileQueues, DivideTilesDownToTheSmallestParts) {
-  TileQueues queues(kSize, size_t{1} << 18, 2);
+  TileQueues queues(kTiledPicture, size_t{1} << 18, 2);
   size_t queue = 3;
   OrderTileMask tiles = TileQueues::kAllOpen;
   for (int side = kOrderTilesAlong; side > TileQueues::kMinPart; side /= 2) {
@@ -259,7 +260,7 @@ TEST(TileQueues, DivideTilesDownToTheSmallestParts) {
 }
 
 TEST(TileQueues, DivideNoTileWhereMemoryIsShort) {
-  TileQueues few(kSize, 10000, 2), of_one_thread(kSize, size_t{1} << 18, 1);
+  TileQueues few(kTiledPicture, 10000, 2), of_one_thread(kTiledPicture, size_t{1} << 18, 1);
   EXPECT_FALSE(divide(few, 0));
   EXPECT_FALSE(divide(of_one_thread, 0));
 }
@@ -273,7 +274,7 @@ TEST(TileQueues, DivideNoTileOnceMemoryWasShort) {
     splats[n].y *= 0.4f;
     entries.push_back(n);
   }
-  TileQueues queues(kSize, size_t{1} << 18, 2);
+  TileQueues queues(kTiledPicture, size_t{1} << 18, 2);
   EXPECT_TRUE(divide(queues, 3));
   queues.clear();
   // All lies behind a front of 0, and waits.
@@ -432,7 +433,7 @@ TEST(TileLists, RaiseTheFirstKeyOfASplatToTheLeastThatIsLeft) {
 
 TEST(TileQueues, SayWhenMoreWaitThanTheyHold) {
   const auto splats = leaningSplats(1500, 4);
-  TileQueues queues(kSize, 200, 0);
+  TileQueues queues(kTiledPicture, 200, 0);
   ordersOf(queues, splats, std::vector<size_t>(50, 40));
   EXPECT_TRUE(queues.isFull());
   queues.clear();
@@ -443,7 +444,7 @@ TEST(TileQueues, SplatsThatDoNotLeanNeverWait) {
   auto splats = leaningSplats(800, 5);
   for (ScreenSplat& splat : splats)
     if (!isRecord(splat)) splat.key_slope0 = splat.key_slope1 = 0, splat.key = splat.first;
-  TileQueues queues(kSize, 32, 0);
+  TileQueues queues(kTiledPicture, 32, 0);
   expectOrders(ordersOf(queues, splats, std::vector<size_t>(50, 40)), specifiedFor(splats));
   EXPECT_FALSE(queues.isFull());
 }

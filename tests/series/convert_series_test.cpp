@@ -25,7 +25,7 @@ namespace curvisplat {
 namespace {
 
 /// Expects that two readers decode to the same bits, and state the same ranges.
-void expectSame(const CacheReader& found, const CacheReader& wanted) {
+void expectSameCache(const CacheReader& found, const CacheReader& wanted) {
   ASSERT_EQ(found.bricks().size(), wanted.bricks().size());
   ASSERT_EQ(found.manifest().variables.size(), wanted.manifest().variables.size());
   EXPECT_EQ(found.manifest().requirements, wanted.manifest().requirements);
@@ -68,8 +68,8 @@ void expectEachAsAlone(const std::vector<StepKind>& kinds, const std::vector<uin
     const fs::path alone = folder / ("alone" + std::to_string(step) + ".splats");
     convertQuietly(inputOf({kinds[step]}), optionsFor(alone));
     const CacheReader wanted(alone), found = series.atStep(step);
-    expectSame(found, wanted);
-    expectSame(CacheReader(folder / "series.splats", step), wanted);
+    expectSameCache(found, wanted);
+    expectSameCache(CacheReader(folder / "series.splats", step), wanted);
     for (const std::string& finding : verifyCache(found).findings) ADD_FAILURE() << finding;
   }
 }

@@ -50,7 +50,8 @@ class PartsSource : public FunctionStep {
 };
 
 /// Steps from `first` on.
-SeriesInput inputOf(const Parts& parts, uint64_t first = 0, std::vector<uint32_t> scalars = {0, 1, 2, 3}) {
+SeriesInput inputOfParts(const Parts& parts, uint64_t first = 0,
+                         std::vector<uint32_t> scalars = {0, 1, 2, 3}) {
   SeriesInput input;
   input.count = parts.steps - first;
   input.name = [first](uint64_t step) { return "file " + std::to_string(first + step); };
@@ -66,7 +67,7 @@ SeriesOptions apart(const fs::path& output) {
 }
 
 void convertSets(const Parts& parts, const fs::path& output) {
-  convertQuietly(inputOf(parts), apart(output));
+  convertQuietly(inputOfParts(parts), apart(output));
 }
 
 TEST(OwnBlanksSeries, EachSetIsASeriesOfItsScalars) {
@@ -80,7 +81,7 @@ TEST(OwnBlanksSeries, EachSetIsASeriesOfItsScalars) {
   for (size_t n = 0; n < std::size(scalars); ++n) {
     SCOPED_TRACE(n);
     const fs::path alone = folder / ("alone" + std::to_string(n) + ".splats");
-    convertQuietly(inputOf({}, 0, scalars[n]), optionsFor(alone));
+    convertQuietly(inputOfParts({}, 0, scalars[n]), optionsFor(alone));
     const CacheReader set = n == 0 ? whole.atStep(4) : whole.atStep(4).ownBlanks(n - 1);
     EXPECT_EQ(set.step(), 4u);
     EXPECT_EQ(set.wholePath(), cache);
@@ -114,7 +115,7 @@ TEST(OwnBlanksSeries, AddsStepsResumesAndTakesUpAKilledAddition) {
     SeriesOptions adding = apart(cache);
     adding.add = before == 2;
     adding.convert.resume = !adding.add;
-    convertQuietly(inputOf({}, adding.add ? before : 0), adding);
+    convertQuietly(inputOfParts({}, adding.add ? before : 0), adding);
     EXPECT_TRUE(allFilesOf(cache) == wanted);
   }
 }
@@ -127,7 +128,7 @@ TEST(OwnBlanksSeries, StepsAreAddedToACacheOfOne) {
   EXPECT_FALSE(CacheReader(cache).seriesManifest().hasFeature("own-blanks-steps"));
   SeriesOptions adding = apart(cache);
   adding.add = true;
-  convertQuietly(inputOf({}, 1), adding);
+  convertQuietly(inputOfParts({}, 1), adding);
   EXPECT_TRUE(allFilesOf(cache) == allFilesOf(folder / "all.splats"));
 }
 
@@ -136,7 +137,7 @@ void expectS2EndsAfterTwo(const Parts& parts, const char* reason) {
   const fs::path cache = folder / "all.splats";
   std::vector<std::string> warnings;
   Progress progress;
-  convertSeries(inputOf(parts), apart(cache), progress, [&](const SeriesEvent& event) {
+  convertSeries(inputOfParts(parts), apart(cache), progress, [&](const SeriesEvent& event) {
     if (event.added)
       warnings.insert(warnings.end(), event.added->warnings.begin(), event.added->warnings.end());
   });
@@ -164,7 +165,7 @@ TEST(OwnBlanksSeries, RanksAndPartsMakeTheSameBytes) {
       SeriesOptions options = apart(folder / "ranks.splats");
       options.convert.ranks = &ranks;
       options.convert.threads = 1;
-      convertQuietly(inputOf(parts), options);
+      convertQuietly(inputOfParts(parts), options);
     });
     EXPECT_TRUE(allFilesOf(folder / "ranks.splats") == wanted);
 
@@ -174,7 +175,7 @@ TEST(OwnBlanksSeries, RanksAndPartsMakeTheSameBytes) {
     makePartsFolder(partsFolder(output));
     for (uint64_t index = 0; index < 2; ++index) {
       const SeriesPart part{index, 2};
-      SeriesInput input = inputOf(parts);
+      SeriesInput input = inputOfParts(parts);
       const std::vector<uint64_t> places = placesOfPart(part, parts.steps);
       SeriesInput own = input;
       own.count = places.size();

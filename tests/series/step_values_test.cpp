@@ -86,7 +86,7 @@ SplatVariable decoded(std::span<const std::byte> bytes, const TimeReferences& re
   return values;
 }
 
-void expectSame(const SplatVariable& a, const SplatVariable& b) {
+void expectSameVariable(const SplatVariable& a, const SplatVariable& b) {
   EXPECT_EQ(a.mean, b.mean);
   EXPECT_EQ(a.slope0, b.slope0);
   EXPECT_EQ(a.slope1, b.slope1);
@@ -108,7 +108,7 @@ TEST(TimePrediction, DecodesToTheSameNumbersInFewerBytes) {
   EXPECT_EQ(stepsBackOf(alone), (std::array<uint8_t, 2>{0, 0}));
   EXPECT_EQ(stepsBackOf(timed), (std::array<uint8_t, 2>{1, 0}));
   EXPECT_LT(timed.size(), alone.size() * 6 / 10);
-  expectSame(decoded(timed, one), decoded(alone));
+  expectSameVariable(decoded(timed, one), decoded(alone));
   for (uint32_t n = 0; n < kCount; ++n) EXPECT_EQ(second[n].mean, second_alone[n].mean);
 
   const SplatVariable second_values = decoded(alone);
@@ -120,7 +120,7 @@ TEST(TimePrediction, DecodesToTheSameNumbersInFewerBytes) {
   const auto third_timed = encodeValuesStream(rows, third, two);
   EXPECT_EQ(stepsBackOf(third_timed), (std::array<uint8_t, 2>{1, 2}));
   EXPECT_LT(third_timed.size(), third_stream.size());
-  expectSame(decoded(third_timed, two), decoded(third_stream));
+  expectSameVariable(decoded(third_timed, two), decoded(third_stream));
 }
 
 /// Codes by the values' own scale, whose units follow from the decoded means.
@@ -138,13 +138,14 @@ TEST(TimePrediction, OfScaledValuesDecodesToTheSameNumbers) {
   ASSERT_STREQ(featureOf(timed), kScaledValues);
   EXPECT_EQ(stepsBackOf(timed)[0], 1);
   EXPECT_LT(timed.size(), alone.size());
-  expectSame(decoded(timed, references), decoded(alone));
+  expectSameVariable(decoded(timed, references), decoded(alone));
   const SplatVariable second_values = decoded(alone);
   references.steps_back = {1, 2};
   references.values = {arraysOf(second_values), arraysOf(first_values)};
   auto third_alone = third;
   const auto third_stream = encodeValuesStream(rows, third_alone, {}, coding);
-  expectSame(decoded(encodeValuesStream(rows, third, references, coding), references), decoded(third_stream));
+  expectSameVariable(decoded(encodeValuesStream(rows, third, references, coding), references),
+                     decoded(third_stream));
 }
 
 TEST(TimePrediction, IsNotUsedWhereItGainsNothing) {

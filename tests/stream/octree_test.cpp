@@ -85,7 +85,7 @@ TEST(Cell, MortonOrderVisitsChildrenTogether) {
 }
 
 /// The largest singular value by iteration. Converges in value for equal ones, too.
-double largestSingular(const glm::dmat3& a) {
+double spectralNorm(const glm::dmat3& a) {
   glm::dvec3 v(0.6, 0.5, 0.4);
   for (int n = 0; n < 3000; ++n) v = glm::normalize(glm::transpose(a) * (a * v));
   return glm::length(a * v);
@@ -120,8 +120,8 @@ TEST(ShapeExtent, IsThatOfTheExtremeSplat) {
       Splat scaled = splat;
       for (double& axis : scaled.axis) axis /= unit;
       const glm::dmat3 a = scaled.factor();
-      largest = std::max(largest, largestSingular(a));
-      smallest = std::min(smallest, 1 / largestSingular(glm::inverse(a)));
+      largest = std::max(largest, spectralNorm(a));
+      smallest = std::min(smallest, 1 / spectralNorm(glm::inverse(a)));
     }
     const double found_largest = largestSingularValue(splats) / unit,
                  found_smallest = smallestSingularValue(splats) / unit;

@@ -77,7 +77,7 @@ TEST(MeasurementsDeath, ANameComesOnceAndSamplesAreNumbers) {
   EXPECT_DEATH(measurements.add("b", "s", {std::numeric_limits<double>::infinity()}), "internal error");
 }
 
-constexpr uint64_t kMiB = 1 << 20;
+constexpr uint64_t kMebibyte = 1 << 20;
 
 /// 1 M splats, half a second: 0.02 + 0.02 s decoded (nothing, in memory), 0.05 projected, 0.02 sorted, 0.4
 /// drawn.
@@ -85,7 +85,7 @@ JudgedFrame frame() {
   return {.seconds = 0.5,
           .lod_pixels = 1,
           .threads = 2,
-          .memory_bytes = 512 * kMiB,
+          .memory_bytes = 512 * kMebibyte,
           .splats_prepared = 1'000'000,
           .splats_drawn = 1'000'000,
           .bytes = 8'000'000,
@@ -188,10 +188,10 @@ TEST(Verdict, ACardThatDrawsIsNotAdvised) {
 }
 
 TEST(Verdict, CoarserErrorsAreAdvisedByWhatTheyGave) {
-  const OtherFrame others[] = {{0.5, 1, 2, 512 * kMiB, 1'000'000},
-                               {0.2, 2, 2, 512 * kMiB, 250'000},
-                               {0.49, 4, 2, 512 * kMiB, 900'000},  // within the noise
-                               {0.1, 8, 1, 512 * kMiB, 100'000}};  // other threads
+  const OtherFrame others[] = {{0.5, 1, 2, 512 * kMebibyte, 1'000'000},
+                               {0.2, 2, 2, 512 * kMebibyte, 250'000},
+                               {0.49, 4, 2, 512 * kMebibyte, 900'000},  // within the noise
+                               {0.1, 8, 1, 512 * kMebibyte, 100'000}};  // other threads
   const Verdict verdict = judge(frame(), speeds(), others);
   EXPECT_TRUE(says(verdict, "--lod-pixels 2 takes 0.20 s, 2.5 times as fast (4.0x fewer splats)"))
       << all(verdict);
@@ -202,31 +202,32 @@ TEST(Verdict, CoarserErrorsAreAdvisedByWhatTheyGave) {
 TEST(Verdict, CoresAreAdvisedByWhatTheyGave) {
   JudgedFrame four = frame();
   four.threads = 4;
-  OtherFrame others[] = {{0.2, 2, 4, 512 * kMiB, 250'000}, {0.6, 2, 1, 512 * kMiB, 250'000}};
+  OtherFrame others[] = {{0.2, 2, 4, 512 * kMebibyte, 250'000}, {0.6, 2, 1, 512 * kMebibyte, 250'000}};
   EXPECT_TRUE(
       says(judge(four, speeds(), others),
            "--threads 4 draws --lod-pixels 2 3.0 times as fast as --threads 1: more cores would help"));
   others[1].seconds = 0.5;
   EXPECT_TRUE(
       says(judge(four, speeds(), others), "2.5 times as fast as --threads 1: more cores would help little"));
-  others[1].memory_bytes = 128 * kMiB;  // no longer the same but for threads
+  others[1].memory_bytes = 128 * kMebibyte;  // no longer the same but for threads
   EXPECT_FALSE(says(judge(four, speeds(), others), "more cores"));
-  const OtherFrame two[] = {{0.2, 2, 2, 512 * kMiB, 250'000}, {0.38, 2, 1, 512 * kMiB, 250'000}};
+  const OtherFrame two[] = {{0.2, 2, 2, 512 * kMebibyte, 250'000}, {0.38, 2, 1, 512 * kMebibyte, 250'000}};
   EXPECT_TRUE(says(judge(frame(), speeds(), two), "1.9 times as fast as --threads 1: more cores would help"));
 }
 
 TEST(Verdict, MemoryIsAdvisedByWhatItGave) {
-  OtherFrame others[] = {{0.2, 2, 2, 512 * kMiB, 250'000}, {0.1, 2, 2, 2048 * kMiB, 250'000}};
+  OtherFrame others[] = {{0.2, 2, 2, 512 * kMebibyte, 250'000}, {0.1, 2, 2, 2048 * kMebibyte, 250'000}};
   EXPECT_TRUE(
       says(judge(frame(), speeds(), others), "--memory 2048M would help: --lod-pixels 2 takes 0.10 s"));
   others[1].seconds = 0.195;
   EXPECT_TRUE(says(judge(frame(), speeds(), others), "more than --memory 512M would not help"));
-  others[1].memory_bytes = 128 * kMiB;
+  others[1].memory_bytes = 128 * kMebibyte;
   EXPECT_FALSE(says(judge(frame(), speeds(), others), "--memory"));
 }
 
 TEST(Verdict, ADifferenceWithinTheSpreadIsNone) {
-  OtherFrame others[] = {{0.2, 2, 2, 512 * kMiB, 250'000, 0.06}, {0.1, 2, 2, 2048 * kMiB, 250'000, 0.05}};
+  OtherFrame others[] = {{0.2, 2, 2, 512 * kMebibyte, 250'000, 0.06},
+                         {0.1, 2, 2, 2048 * kMebibyte, 250'000, 0.05}};
   const Verdict same = judge(frame(), speeds(), others);
   EXPECT_TRUE(says(same, "--memory 2048M instead of 512M: no difference measured")) << all(same);
   EXPECT_FALSE(says(same, "would help")) << all(same);
@@ -235,7 +236,8 @@ TEST(Verdict, ADifferenceWithinTheSpreadIsNone) {
 
   JudgedFrame four = frame();
   four.threads = 4;
-  const OtherFrame cores[] = {{0.2, 2, 4, 512 * kMiB, 250'000, 0.1}, {0.3, 2, 1, 512 * kMiB, 250'000, 0.1}};
+  const OtherFrame cores[] = {{0.2, 2, 4, 512 * kMebibyte, 250'000, 0.1},
+                              {0.3, 2, 1, 512 * kMebibyte, 250'000, 0.1}};
   EXPECT_TRUE(says(judge(four, speeds(), cores), "--threads 4 instead of 1: no difference measured"));
 }
 

@@ -42,7 +42,7 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using ResultsJson = nlohmann::ordered_json;
 
 constexpr int kSchema = 1;  // of the JSON; bench/compare.py reads it
 constexpr uint64_t kMinNodes = 1000;
@@ -59,16 +59,17 @@ struct BenchArguments {
 };
 
 /// How long to measure: the defaults, or kQuick.
-struct Effort {
+struct BenchEffort {
   DiskEffort disk;
   StageEffort stages;
   FrameEffort frames;
 };
-constexpr Effort kQuick{{.sample_s = 0.02, .samples = 2, .max_bytes = 32 << 20},
-                        {.sample_s = 0.02, .samples = 2, .max_splats = 150'000, .max_read_bytes = 16 << 20},
-                        {.configuration_s = 0.3, .total_s = 6, .max_frames = 4}};
+constexpr BenchEffort kQuick{
+    {.sample_s = 0.02, .samples = 2, .max_bytes = 32 << 20},
+    {.sample_s = 0.02, .samples = 2, .max_splats = 150'000, .max_read_bytes = 16 << 20},
+    {.configuration_s = 0.3, .total_s = 6, .max_frames = 4}};
 
-void checkArguments(const BenchArguments& arguments) {
+void checkBenchArguments(const BenchArguments& arguments) {
   if (arguments.converts && !arguments.cache.empty())
     throw UsageError("{}: --convert measures a generated grid; give either a cache or --convert",
                      arguments.cache.string());
@@ -101,9 +102,10 @@ void printSection(const std::string& head, const std::string& text) {
 }
 
 /// The common beginning of the JSON report, and the measurements.
-Json reportOf(const BenchArguments& arguments, const Machine& machine, const Measurements& measurements) {
+ResultsJson reportOf(const BenchArguments& arguments, const Machine& machine,
+                     const Measurements& measurements) {
   const nlohmann::json run = runStatistics();
-  Json json{{"schema", kSchema}};
+  ResultsJson json{{"schema", kSchema}};
   for (const char* key : {"program", "version", "command", "peak_memory_bytes"}) json[key] = run[key];
   json["quick"] = arguments.quick;
   json["machine"] = machine.toJson();
@@ -112,9 +114,9 @@ Json reportOf(const BenchArguments& arguments, const Machine& machine, const Mea
   return json;
 }
 
-void writeResults(const BenchArguments& arguments, const Json& json, const Plots& plots) {
+void writeResults(const BenchArguments& arguments, const ResultsJson& json, const Plots& plots) {
   // The recorded arguments may not be valid UTF-8, which JSON requires.
-  constexpr auto kReplace = Json::error_handler_t::replace;
+  constexpr auto kReplace = ResultsJson::error_handler_t::replace;
   if (!arguments.json.empty()) writeFileDurably(arguments.json, json.dump(2, ' ', false, kReplace) + "\n");
   if (arguments.plots.empty()) return;
   std::error_code error;
@@ -185,7 +187,7 @@ void benchRanks(const BenchArguments& arguments) {
                   options.size.width, options.size.height, options.lod_pixels,
                   shortCount(static_cast<double>(simulated.splats)), countText(simulated.parts, "part")),
       rankTable(simulated));
-  Json json = reportOf(arguments, Machine::here(cache.path()), {});
+  ResultsJson json = reportOf(arguments, Machine::here(cache.path()), {});
   json["ranks"] = toJson(simulated);
   writeResults(arguments, json, rankPlots(simulated));
 }
@@ -217,7 +219,7 @@ void benchCache(const BenchArguments& arguments) {
   const ThroughputScene scene{cache, variable, function, options, backend, orbit};
   const std::string backend_name = FrameRenderer(cache, variable, function, backend).backendName();
   const Machine machine = Machine::here(cache.path());
-  const Effort effort = arguments.quick ? kQuick : Effort{};
+  const BenchEffort effort = arguments.quick ? kQuick : BenchEffort{};
 
   printLine("{}: {} samples as {} splats in {}; scalar {}", arguments.cache.string(), manifest.nodes,
             manifest.splats, countText(manifest.bricks, "brick"), info.name);
@@ -252,7 +254,7 @@ void benchCache(const BenchArguments& arguments) {
   printSection("What it means", lines);
   printSection("Not measured", leftOutTable(measurements));
 
-  Json json = reportOf(arguments, machine, measurements);
+  ResultsJson json = reportOf(arguments, machine, measurements);
   json["cache"] = {{"path", arguments.cache.string()},
                    {"scalar", info.name},
                    {"nodes", manifest.nodes},
@@ -306,7 +308,7 @@ void benchConversion(const BenchArguments& arguments) {
       conversionTable(report));
   printSection("Total", conversionSummary(report, measurements));
   printSection("Not measured", leftOutTable(measurements));
-  Json json = reportOf(arguments, machine, measurements);
+  ResultsJson json = reportOf(arguments, machine, measurements);
   json["conversion"] = toJson(report);
   writeResults(arguments, json, conversionPlots(report));
 }
@@ -358,7 +360,7 @@ void addBench(CLI::App& app) {
   command->add_option("--tmp", arguments->temporary_folder, "Temporary directory (default: the system's)")
       ->group(how);
   command->callback([arguments] {
-    checkArguments(*arguments);
+    checkBenchArguments(*arguments);
     if (arguments->ranks) return benchRanks(*arguments);
     arguments->converts ? benchConversion(*arguments) : benchCache(*arguments);
   });

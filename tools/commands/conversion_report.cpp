@@ -33,7 +33,7 @@ struct Forecast {
   unsigned threads = 0;
 };
 
-uint64_t nodesOf(const GridDescription& description) {
+uint64_t samplesOf(const GridDescription& description) {
   uint64_t nodes = 0;
   for (const GridBlock& block : description.blocks) nodes += block.nodes();
   for (const MeshPiece& piece : description.pieces) nodes += piece.points;
@@ -50,7 +50,7 @@ std::string freeText(const std::filesystem::path& folder) {
   return bytes ? fmt::format(" ({} are free)", byteText(*bytes)) : "";
 }
 
-void print(const Forecast& forecast, const ConvertOptions& options) {
+void printForecast(const Forecast& forecast, const ConvertOptions& options) {
   const std::filesystem::path output = std::filesystem::absolute(options.output).parent_path();
   const double samples = static_cast<double>(forecast.samples) * static_cast<double>(forecast.steps);
   // A sample that was the whole grid has measured the sizes.
@@ -77,7 +77,7 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
 }
 
 void finish(const Forecast& forecast, const ConvertOptions& options, const ConvertArguments& arguments) {
-  print(forecast, options);
+  printForecast(forecast, options);
   if (arguments.statistics.empty()) return;
   nlohmann::json json = runStatistics();
   json["dry_run"] = {{"samples", forecast.samples},
@@ -95,7 +95,7 @@ void finish(const Forecast& forecast, const ConvertOptions& options, const Conve
 Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, const SampleScale& scale,
                     const ConvertOptions& options) {
   Forecast forecast;
-  forecast.samples = nodesOf(whole);
+  forecast.samples = samplesOf(whole);
   forecast.sampled = report.nodes;
   forecast.threads = report.threads;
   forecast.cache_bytes = scale.bytesOf(report.files);
@@ -109,7 +109,7 @@ Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, c
 /// Uses this process's peak of memory if the sample was the whole grid: it has taken as much as the
 /// conversion will. The plan of memory knows only what grows with the grid, and what is bounded by --memory.
 void useOwnPeak(Forecast& forecast, const GridDescription& whole, const GridDescription& sample) {
-  if (nodesOf(whole) == nodesOf(sample)) forecast.memory_bytes = ProcessUsage::now().peak_memory_bytes;
+  if (samplesOf(whole) == samplesOf(sample)) forecast.memory_bytes = ProcessUsage::now().peak_memory_bytes;
 }
 
 /// Forecasts the conversion of `steps` time steps, whose points and cells are those of the first: each adds values alone.

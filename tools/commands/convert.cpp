@@ -43,7 +43,7 @@ namespace curvisplat {
 namespace {
 
 /// Throws UsageError if options contradict --add-scalar.
-void checkArguments(const ConvertArguments& arguments) {
+void checkAddScalarArguments(const ConvertArguments& arguments) {
   if (arguments.to.empty()) throw UsageError("--add-scalar needs --to CACHE, the cache to add to");
   if (arguments.added_scalars.empty()) throw UsageError("--to needs --add-scalar NAME, the scalar to add");
   const auto refuse = [](bool given, const char* option) {
@@ -75,7 +75,7 @@ nlohmann::json statisticsOfAddition(const AddScalarReport& report, const Progres
 
 /// Adds the scalars and prints a summary. Throws UsageError if options contradict each other, and Error.
 void runAddScalar(ConvertArguments arguments) {
-  checkArguments(arguments);
+  checkAddScalarArguments(arguments);
   Ranks& ranks = launchedRanks();
   if (!arguments.to.has_filename()) arguments.to = arguments.to.parent_path();  // "NAME.splats/"
   AddScalarOptions options;

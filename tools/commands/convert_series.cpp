@@ -33,7 +33,7 @@
 namespace curvisplat {
 namespace {
 
-void checkPartArguments(const ConvertArguments& arguments) {
+void checkPartOfConversion(const ConvertArguments& arguments) {
   parsePart(*arguments.part);
   const auto refuse = [](bool given, const char* option, const char* reason) {
     if (given) throw UsageError("--part cannot be combined with {}: {}", option, reason);
@@ -46,7 +46,7 @@ void checkPartArguments(const ConvertArguments& arguments) {
   refuse(!launchedRanks().alone(), "mpirun", "ranks share out the steps themselves; leave out one of them");
 }
 
-void checkArguments(const ConvertArguments& arguments) {
+void checkSeriesArguments(const ConvertArguments& arguments) {
   if (arguments.grid.time_step)
     throw UsageError("--time-step {}: chooses one step, and there are several here; use --steps {}",
                      *arguments.grid.time_step, *arguments.grid.time_step);
@@ -54,7 +54,7 @@ void checkArguments(const ConvertArguments& arguments) {
     throw UsageError("--follow: one process converts; start curvisplat without mpirun");
   if (arguments.follows && !arguments.statistics.empty())
     throw UsageError("--stats cannot be combined with --follow, which may go on without an end");
-  if (arguments.part) checkPartArguments(arguments);
+  if (arguments.part) checkPartOfConversion(arguments);
   if (!arguments.adds_steps) return;
   const auto refuse = [](bool given, const char* option) {
     if (given)
@@ -291,7 +291,7 @@ bool isSeries(ConvertArguments& arguments) {
 }
 
 void runConvertSeries(ConvertArguments arguments) {
-  checkArguments(arguments);
+  checkSeriesArguments(arguments);
   if (!arguments.added_scalars.empty())
     throw UsageError(
         "--add-scalar adds to a cache of one time step; give the grid and the files of that step alone");

@@ -74,8 +74,8 @@ struct Comparison {
 };
 
 /// The exported splats, drawn as their viewers do, against our own pictures.
-Comparison compare(const CacheReader& cache, size_t variable, const TransferFunction& function,
-                   const std::vector<GaussianSplat>& splats, uint64_t memory, Progress& progress) {
+Comparison compareExported(const CacheReader& cache, size_t variable, const TransferFunction& function,
+                           const std::vector<GaussianSplat>& splats, uint64_t memory, Progress& progress) {
   const Manifest& manifest = cache.manifest();
   FrameRenderer renderer(cache, variable, function);
   FrameOptions options;
@@ -302,7 +302,7 @@ void exportCache(ExportArguments& arguments) {
   if (!arguments.no_comparison) {
     const auto found = comparisonOf(
         arguments.output.string(),
-        [&] { return compare(cache, variable, function, splats, memory, progress); }, progress);
+        [&] { return compareExported(cache, variable, function, splats, memory, progress); }, progress);
     if (found)
       fmt::print("against curvisplat's own pictures from 12 directions: {:.1f} dB, {:.1f} dB at worst\n",
                  found->mean_db, found->least_db);

@@ -234,7 +234,7 @@ std::vector<std::string> facesOf(const CacheReader& reader) try {
   return {};
 }
 
-Json asJson(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
+Json cacheAsJson(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& manifest = reader.manifest();
   Json json = Json::parse(manifest.toJson());
   if (reader.series().steps.size() > 1) {
@@ -318,7 +318,7 @@ void printRefinement(const Manifest& m) {
                same ? "" : fmt::format(", in {}", countText(count, "block")));
 }
 
-void printAsText(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
+void printCacheAsText(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& m = reader.manifest();
   printLine("{}", m.title);
   printLine("written by {} from{}", m.program, sourcesText(m.sources));
@@ -376,9 +376,9 @@ void printCacheInfo(const InfoOptions& options) {
   const std::vector<StepPosition> positions = chosenSteps(options.steps, readers[0]);
   for (const CacheReader& reader : readers) found.push_back(examine(reader, positions, options));
   Json json;
-  if (options.json) json = asJson(readers[0], options, found[0]);
+  if (options.json) json = cacheAsJson(readers[0], options, found[0]);
   for (size_t n = 1; n < readers.size() && options.json; ++n)
-    json["own_blanks"][n - 1] = asJson(readers[n], options, found[n]);
+    json["own_blanks"][n - 1] = cacheAsJson(readers[n], options, found[n]);
   std::vector<Probe> probes;
   for (Findings& of_reader : found) probes.push_back(std::move(of_reader.probe));
   const Probe joined = joinedProbe(readers, std::move(probes));
@@ -393,7 +393,7 @@ void printCacheInfo(const InfoOptions& options) {
       printLine("values at other samples: {}",
                 fmt::join(readers[0].seriesManifest().own_blanks[n - 1].variables, ", "));
     }
-    printAsText(readers[n], options, found[n]);
+    printCacheAsText(readers[n], options, found[n]);
   }
   if (hasUnfinished(options.grid.grid))
     printMessage("note: a conversion that replaces this cache is in progress or was interrupted");

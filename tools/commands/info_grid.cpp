@@ -39,7 +39,7 @@ struct GridInfo {
   const GridScalar& scalar(uint32_t position) const { return description->scalars[position]; }
 };
 
-GridInfo inspect(const GridSource& source) {
+GridInfo inspectGrid(const GridSource& source) {
   GridInfo info;
   const GridDescription& description = source.description();
   info.description = &description;
@@ -65,7 +65,7 @@ bool isEmpty(const ScalarRange& range) {
   return range.min > range.max;
 }
 
-nlohmann::ordered_json jsonOf(const ScalarRange& range, bool lower) {
+nlohmann::ordered_json limitAsJson(const ScalarRange& range, bool lower) {
   if (isEmpty(range)) return nullptr;
   return lower ? range.min : range.max;
 }
@@ -78,7 +78,7 @@ std::string blankingRule(const GridDescription& description) {
   return any ? "iblank is 0" : "";
 }
 
-std::optional<std::string> dateOfStep(const GridDescription& description, size_t step) {
+std::optional<std::string> dateOfGridStep(const GridDescription& description, size_t step) {
   if (step >= description.times.size()) return std::nullopt;
   return dateOf(description.times[step], {description.time_unit, description.calendar});
 }
@@ -87,7 +87,7 @@ std::optional<std::string> dateOfStep(const GridDescription& description, size_t
 std::string timeText(const GridDescription& description, size_t step) {
   std::string text = numberText(description.times[step], 9);
   if (!description.time_unit.empty()) text += fmt::format(" {}", description.time_unit);
-  if (const auto date = dateOfStep(description, step)) text += fmt::format(" ({})", *date);
+  if (const auto date = dateOfGridStep(description, step)) text += fmt::format(" ({})", *date);
   return text;
 }
 
@@ -126,7 +126,7 @@ nlohmann::ordered_json scalarsAsJson(const GridInfo& info) {
     const GridScalar& of = info.scalar(info.stored[s]);
     const ScalarRange& range = info.statistics.scalars[s];
     nlohmann::ordered_json scalar = {
-        {"name", of.name}, {"min", jsonOf(range, true)}, {"max", jsonOf(range, false)}};
+        {"name", of.name}, {"min", limitAsJson(range, true)}, {"max", limitAsJson(range, false)}};
     if (of.number > 0) scalar["number"] = of.number;
     if (of.function > 0) scalar["function"] = of.function;
     if (!of.unit.empty()) scalar["unit"] = of.unit;
@@ -137,7 +137,7 @@ nlohmann::ordered_json scalarsAsJson(const GridInfo& info) {
   return scalars;
 }
 
-nlohmann::ordered_json asJson(const GridInfo& info) {
+nlohmann::ordered_json gridAsJson(const GridInfo& info) {
   const GridDescription& description = *info.description;
   nlohmann::ordered_json json;
   json["format"] = description.format;
@@ -151,8 +151,8 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
                    {"degenerate", info.statistics.degenerate()},
                    {"inverted", info.statistics.inverted()}};
   for (const ScalarRange& range : info.statistics.bounds) {
-    json["bounds"]["lower"].push_back(jsonOf(range, true));
-    json["bounds"]["upper"].push_back(jsonOf(range, false));
+    json["bounds"]["lower"].push_back(limitAsJson(range, true));
+    json["bounds"]["upper"].push_back(limitAsJson(range, false));
   }
   json["blocks"] = blocksAsJson(info);
   json["scalars"] = scalarsAsJson(info);
@@ -171,7 +171,7 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
   json["time_step"] = description.time_step;
   if (!description.time_unit.empty()) json["time_unit"] = description.time_unit;
   if (!description.calendar.empty()) json["calendar"] = description.calendar;
-  if (const auto date = dateOfStep(description, description.time_step)) json["date"] = *date;
+  if (const auto date = dateOfGridStep(description, description.time_step)) json["date"] = *date;
   json["overlaps"] = nlohmann::ordered_json::array();
   for (const BlockOverlap& overlap : info.overlaps)
     json["overlaps"].push_back(
@@ -225,7 +225,7 @@ void printScalars(const GridInfo& info) {
   printLine("derived   {}", names);
 }
 
-void printAsText(const GridInfo& info) {
+void printGridAsText(const GridInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   if (!info.series.empty()) printLine("series    {}", info.series);
@@ -284,12 +284,13 @@ void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived
       series += (series.empty() ? "" : "; ") + note;
   if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get()))
     return printMeshInfo(*mesh, series, json);
-  GridInfo info = inspect(dynamic_cast<const GridSource&>(*source));
+  GridInfo info = inspectGrid(dynamic_cast<const GridSource&>(*source));
   info.series = series;
   if (json)
-    fmt::print("{}\n", asJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    fmt::print("{}\n",
+               gridAsJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   else
-    printAsText(info);
+    printGridAsText(info);
 }
 
 }  // namespace curvisplat

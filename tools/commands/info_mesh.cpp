@@ -107,7 +107,7 @@ void measure(const MeshSource& source, Centring centring, MeshInfo& info) {
   }
 }
 
-MeshInfo inspect(const MeshSource& source) {
+MeshInfo inspectMesh(const MeshSource& source) {
   MeshInfo info;
   info.description = &source.description();
   info.ranges.resize(info.description->scalars.size());
@@ -134,11 +134,11 @@ MeshInfo inspect(const MeshSource& source) {
   return info;
 }
 
-bool isEmpty(const ScalarRange& range) {
+bool hasNoValue(const ScalarRange& range) {
   return range.min > range.max;
 }
 
-nlohmann::ordered_json asJson(const MeshInfo& info) {
+nlohmann::ordered_json meshAsJson(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   nlohmann::ordered_json json;
   json["format"] = description.format;
@@ -159,7 +159,7 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
   json["scalars"] = nlohmann::ordered_json::array();
   for (size_t n = 0; n < info.ranges.size(); ++n) {
     const GridScalar& of = description.scalars[n];
-    const bool empty = isEmpty(info.ranges[n]);
+    const bool empty = hasNoValue(info.ranges[n]);
     nlohmann::ordered_json scalar = {{"name", of.name}, {"min", nullptr}, {"max", nullptr}};
     if (!empty) scalar["min"] = info.ranges[n].min;
     if (!empty) scalar["max"] = info.ranges[n].max;
@@ -176,7 +176,7 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
   return json;
 }
 
-void printAsText(const MeshInfo& info) {
+void printMeshAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   printLine("{}", description.format);
   if (!info.series.empty()) printLine("series    {}", info.series);
@@ -211,7 +211,7 @@ void printAsText(const MeshInfo& info) {
     printLine("scalar    {}{}{}: {}", scalar.name,
               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
               scalar.centring == Centring::kCell ? ", cell-centred" : "",
-              isEmpty(range) ? "no value" : rangeText(range.min, range.max, 6));
+              hasNoValue(range) ? "no value" : rangeText(range.min, range.max, 6));
     if (info.not_finite[n] > 0)
       printLine("          {} of its values {} {}", info.not_finite[n],
                 info.not_finite[n] == 1 ? "is" : "are", notFiniteText(description));
@@ -227,12 +227,13 @@ void printAsText(const MeshInfo& info) {
 }  // namespace
 
 void printMeshInfo(const MeshSource& source, const std::string& series, bool json) {
-  MeshInfo info = inspect(source);
+  MeshInfo info = inspectMesh(source);
   info.series = series;
   if (json)
-    fmt::print("{}\n", asJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    fmt::print("{}\n",
+               meshAsJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   else
-    printAsText(info);
+    printMeshAsText(info);
 }
 
 }  // namespace curvisplat

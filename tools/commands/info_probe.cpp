@@ -19,7 +19,7 @@
 namespace curvisplat {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using ProbeJson = nlohmann::ordered_json;
 
 std::vector<VariableInfo> variablesOf(std::span<const CacheReader> readers) {
   std::vector<VariableInfo> variables;
@@ -28,16 +28,16 @@ std::vector<VariableInfo> variablesOf(std::span<const CacheReader> readers) {
   return variables;
 }
 
-Json jsonOf(const std::vector<VariableInfo>& variables, const PointValues& found, bool of_source) {
+ProbeJson pointAsJson(const std::vector<VariableInfo>& variables, const PointValues& found, bool of_source) {
   const char* const at = of_source ? "place" : "centre";
-  Json json = {{"block", found.block},
-               {"i", found.i},
-               {"j", found.j},
-               {"k", found.k},
-               {at, {found.place.x, found.place.y, found.place.z}},
-               {"distance", found.distance},
-               {"from", of_source ? "source" : "cache"}};
-  json["values"] = Json::array();
+  ProbeJson json = {{"block", found.block},
+                    {"i", found.i},
+                    {"j", found.j},
+                    {"k", found.k},
+                    {at, {found.place.x, found.place.y, found.place.z}},
+                    {"distance", found.distance},
+                    {"from", of_source ? "source" : "cache"}};
+  json["values"] = ProbeJson::array();
   for (size_t v = 0; v < found.values.size(); ++v)
     json["values"].push_back(
         {{"name", variables[v].name}, {"value", found.values[v]}, {"mean", found.sample[v]}});
@@ -143,14 +143,14 @@ ProbedPoints parseProbe(const ProbeArguments& arguments) {
   return {true, parsePointList(readTextFile(text, uint64_t{1} << 30), text), {}};
 }
 
-Json probeAsJson(std::span<const CacheReader> readers, const Probe& probe) {
+ProbeJson probeAsJson(std::span<const CacheReader> readers, const Probe& probe) {
   const std::vector<VariableInfo> variables = variablesOf(readers);
-  Json steps = Json::array();
+  ProbeJson steps = ProbeJson::array();
   for (const ProbedStep& step : probe.steps) {
-    Json all = Json::array();
+    ProbeJson all = ProbeJson::array();
     for (const auto& of_point : step.found)
-      all.push_back(of_point ? jsonOf(variables, *of_point, probe.of_source) : Json(nullptr));
-    Json of_step = probe.asked.is_table ? all : all[0];
+      all.push_back(of_point ? pointAsJson(variables, *of_point, probe.of_source) : ProbeJson(nullptr));
+    ProbeJson of_step = probe.asked.is_table ? all : all[0];
     if (!probe.of_steps) return of_step;
     steps.push_back({{"step", step.step}, {"time", step.time}, {"probe", std::move(of_step)}});
   }

@@ -78,7 +78,7 @@ std::string head(const std::string& title, const std::string& name, const std::s
 }
 
 /// "-o, --output VALUE"
-std::string namesOf(const CLI::Option& option) {
+std::string optionNames(const CLI::Option& option) {
   std::string names;
   for (const std::string& name : option.get_snames()) names += ", " + bold("-" + name);
   for (const std::string& name : option.get_lnames()) names += ", " + bold("--" + name);
@@ -92,7 +92,7 @@ std::string entryOf(const CLI::Option& option) {
   if (!option.get_default_str().empty())
     text += fmt::format(" (default: {})", roff(option.get_default_str()));
   if (option.nonpositional() && option.get_required()) text += " (required)";
-  return fmt::format(".TP\n{}\n{}\n", namesOf(option), text);
+  return fmt::format(".TP\n{}\n{}\n", optionNames(option), text);
 }
 
 /// The page of the whole program, which names the subcommands. Subcommands without a group are hidden.

@@ -11,29 +11,29 @@
 namespace curvisplat {
 namespace {
 
-using Json = nlohmann::json;
+using StatisticsJson = nlohmann::json;
 using FrameField = StatisticsField<FrameStatistics>;
 
-Json& placeOf(Json& json, const FrameField& field) {
+StatisticsJson& placeOf(StatisticsJson& json, const FrameField& field) {
   return (field.seconds ? json["seconds"] : json)[field.name];
 }
 
-Json jsonOf(uint64_t number) {
+StatisticsJson jsonOf(uint64_t number) {
   return number;
 }
 /// An error on the screen is infinite near a perspective camera.
-Json jsonOf(double number) {
-  return std::isfinite(number) ? Json(number) : Json();
+StatisticsJson jsonOf(double number) {
+  return std::isfinite(number) ? StatisticsJson(number) : StatisticsJson();
 }
 
-Json toJson(const glm::dvec3& v) {
+StatisticsJson toJson(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
 }
 
-Json toJson(const Camera& camera) {
-  Json json{{"position", toJson(camera.position)},
-            {"focal_point", toJson(camera.focal_point)},
-            {"view_up", toJson(camera.view_up)}};
+StatisticsJson toJson(const Camera& camera) {
+  StatisticsJson json{{"position", toJson(camera.position)},
+                      {"focal_point", toJson(camera.focal_point)},
+                      {"view_up", toJson(camera.view_up)}};
   if (camera.projection == Projection::kOrthographic) {
     json["projection"] = "orthographic";
     json["parallel_scale"] = camera.parallel_scale;
@@ -44,43 +44,43 @@ Json toJson(const Camera& camera) {
   return json;
 }
 
-Json toJson(const TransferFunction& function) {
+StatisticsJson toJson(const TransferFunction& function) {
   return {{"name", function.name()},
           {"range", {function.range().first, function.range().second}},
           {"log_scale", function.logScale()},
           {"opacity_unit", function.opacityUnit()}};
 }
 
-Json toJson(const FrameStatistics& statistics) {
-  Json json;
+StatisticsJson toJson(const FrameStatistics& statistics) {
+  StatisticsJson json;
   for (const FrameField& field : statisticsFields())
     field.visit(statistics, [&](auto number) { placeOf(json, field) = jsonOf(number); });
   json["read_by"] = statistics.read_by;
-  json["bricks_unreadable"] = Json::array();
+  json["bricks_unreadable"] = StatisticsJson::array();
   for (const BrickFailure& failure : statistics.bricks_unreadable)
     json["bricks_unreadable"].push_back({{"brick", failure.brick}, {"reason", failure.reason}});
   return json;
 }
 
-FrameStatistics statisticsFrom(const Json& json) {
+FrameStatistics statisticsFrom(const StatisticsJson& json) {
   FrameStatistics statistics;
   for (const FrameField& field : statisticsFields())
     field.visit(statistics, [&](auto& number) {
-      const Json& stored = (field.seconds ? json["seconds"] : json)[field.name];
+      const StatisticsJson& stored = (field.seconds ? json["seconds"] : json)[field.name];
       if constexpr (std::is_same_v<decltype(number), double&>)
         number = stored.is_null() ? INFINITY : stored.get<double>();
       else
         number = stored;
     });
   statistics.read_by = json["read_by"];
-  for (const Json& failure : json["bricks_unreadable"])
+  for (const StatisticsJson& failure : json["bricks_unreadable"])
     statistics.bricks_unreadable.push_back({failure["brick"], failure["reason"]});
   return statistics;
 }
 
 /// Percentiles by the nearest-rank method: always a value of some frame.
 template <typename T>
-Json spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
+StatisticsJson spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
   std::vector<T> values;
   for (const FrameReport& frame : frames) values.push_back(frame.statistics.*value);
   std::sort(values.begin(), values.end());
@@ -90,8 +90,8 @@ Json spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
   return {{"p50", percentile(50)}, {"p95", percentile(95)}, {"max", jsonOf(values.back())}};
 }
 
-Json overFrames(const std::vector<FrameReport>& frames) {
-  Json json{{"frames", frames.size()}};
+StatisticsJson overFrames(const std::vector<FrameReport>& frames) {
+  StatisticsJson json{{"frames", frames.size()}};
   for (const FrameField& field : statisticsFields())
     std::visit([&](auto member) { placeOf(json, field) = spread(frames, member); }, field.value);
   return json;
@@ -100,19 +100,19 @@ Json overFrames(const std::vector<FrameReport>& frames) {
 }  // namespace
 
 Ranks::Bytes packStatistics(const std::vector<FrameReport>& frames) {
-  Json json = Json::array();
+  StatisticsJson json = StatisticsJson::array();
   for (const FrameReport& frame : frames) {
     json.push_back(toJson(frame.statistics));
     json.back()["frame"] = frame.number;
     json.back()["time"] = frame.time;
   }
-  const std::vector<uint8_t> bytes = Json::to_cbor(json);
+  const std::vector<uint8_t> bytes = StatisticsJson::to_cbor(json);
   return fromBytes<std::byte>(toBytes(bytes));
 }
 
 std::vector<FrameReport> unpackStatistics(const Ranks::Bytes& bytes) {
   std::vector<FrameReport> frames;
-  for (const Json& json : Json::from_cbor(fromBytes<uint8_t>(bytes)))
+  for (const StatisticsJson& json : StatisticsJson::from_cbor(fromBytes<uint8_t>(bytes)))
     frames.push_back({json["frame"], json["time"], {}, statisticsFrom(json)});
   return frames;
 }
@@ -125,7 +125,7 @@ FrameStatistics combined(const std::vector<FrameStatistics>& ranks) {
 
 nlohmann::json statisticsOf(const RenderReport& report) {
   const FrameOptions& options = report.options;
-  Json json = runStatistics();
+  StatisticsJson json = runStatistics();
   json["cache"] = report.cache.string();
   json["scalar"] = {{"name", report.variable.name}, {"range", {report.variable.min, report.variable.max}}};
   json["image"] = {
@@ -143,13 +143,13 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   if (options.clip_box)
     json["clip_box"] = {{"lower", toJson(options.clip_box->lower)},
                         {"upper", toJson(options.clip_box->upper)}};
-  json["clip_planes"] = Json::array();
+  json["clip_planes"] = StatisticsJson::array();
   for (const ClipPlane& plane : options.clip_planes)
     json["clip_planes"].push_back({{"point", toJson(plane.point)}, {"normal", toJson(plane.normal)}});
   json["light"] = nullptr;
   if (const auto& light = options.light) {
     json["light"] = {{"ambient", light->ambient}, {"diffuse", light->diffuse}, {"specular", light->specular}};
-    json["light"]["direction"] = light->towards ? toJson(*light->towards) : Json();
+    json["light"]["direction"] = light->towards ? toJson(*light->towards) : StatisticsJson();
     json["light"]["shadow"] = light->shadow;
     json["light"]["ambient_occlusion"] = light->ambient_occlusion;
   }
@@ -164,9 +164,9 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   json["time_to_first_image_s"] = nullptr;
   if (report.time_to_first_image_s) json["time_to_first_image_s"] = *report.time_to_first_image_s;
   if (report.first_image) json["first_image"] = toJson(*report.first_image);
-  json["frames"] = Json::array();
+  json["frames"] = StatisticsJson::array();
   for (const FrameReport& frame : report.frames) {
-    Json one = toJson(frame.statistics);
+    StatisticsJson one = toJson(frame.statistics);
     one["time"] = frame.time;
     one["frame"] = frame.number;
     for (const FrameStatistics& of_rank : frame.of_ranks) one["of_ranks"].push_back(toJson(of_rank));

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr SceneGridSize kSize{64, 48, 24};
-constexpr int kSteps = 8;
+constexpr int kExampleSteps = 8;
 constexpr double kTimeOfStep = 0.06;  // a wave length of the vortices takes 1
 
 fs::path exampleFolder() {
@@ -35,8 +35,8 @@ void writeExample(Progress& progress) {
   const fs::path folder = exampleFolder();
   makePrivateFolders(folder);
   const auto prefix = [&](int step) { return folder / fmt::format("wake_{:04}", step); };
-  if (fs::exists(prefix(kSteps - 1).string() + ".fun")) return;
-  for (int step = 0; step < kSteps; ++step) {
+  if (fs::exists(prefix(kExampleSteps - 1).string() + ".fun")) return;
+  for (int step = 0; step < kExampleSteps; ++step) {
     const SceneGridSource source(makeScenesAt("wake", {}, {kTimeOfStep * step, false}), kSize);
     Plot3dOutputs outputs = plot3dOutputs(prefix(step));
     outputs.grid = step == 0 ? exampleFiles().front() : fs::path();

@@ -172,7 +172,7 @@ bool isOfGridAlone(const std::string& name) {
   return std::ranges::find(kNames, name) != kNames.end();
 }
 
-bool isSeries(const CacheReader& cache) {
+bool hasSeveralSteps(const CacheReader& cache) {
   return cache.series().steps.size() > 1;
 }
 
@@ -183,7 +183,7 @@ Centring centringOf(const CacheReader& cache) {
 /// The scalars that the files have; of a series, those of its first step.
 std::vector<GridScalar> scalarsIn(const std::vector<fs::path>& files, const CacheReader& cache) {
   ConvertArguments arguments = argumentsFor(files, cache.path());
-  if (isSeries(cache)) arguments.grid = stepsOfFiles(files).front().options;
+  if (hasSeveralSteps(cache)) arguments.grid = stepsOfFiles(files).front().options;
   return openSource(arguments, cache.path())->description().scalars;
 }
 
@@ -224,7 +224,7 @@ std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::ve
 
 void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files, const std::string& name,
                       Progress& progress) {
-  if (isSeries(CacheReader(cache))) return addScalarToSeries(cache, files, name, progress);
+  if (hasSeveralSteps(CacheReader(cache))) return addScalarToSeries(cache, files, name, progress);
   ConvertArguments arguments = argumentsFor(files, cache);
   arguments.added_scalars = {name};
   const auto source =

@@ -200,7 +200,7 @@ std::string smallText(const fs::path& file) {
 
 /// The words that may be names of files in a text: what stands between the quotes of XML (.pvd, .vtm) and
 /// JSON (.p3d), and the words of an EnSight case.
-std::set<std::string> namesIn(const std::string& text) {
+std::set<std::string> fileNamesIn(const std::string& text) {
   std::set<std::string> names;
   const std::string_view begin = trimmed(text).substr(0, 6);
   if (isSameIgnoringCase(begin, "format"))
@@ -268,7 +268,7 @@ class StampedFiles {
     if (depth == kMaxDepth) return;
     constexpr size_t kMaxPatterns = 1000;  // each lists a folder
     size_t patterns = 0;
-    for (const std::string& name : namesIn(smallText(file))) {
+    for (const std::string& name : fileNamesIn(smallText(file))) {
       if (name.find('*') != std::string::npos && ++patterns > kMaxPatterns) continue;
       for (const fs::path& named : filesNamed(name, file))
         if (named != file) add(named, depth + 1);

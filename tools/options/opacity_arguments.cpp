@@ -10,7 +10,7 @@ namespace curvisplat {
 namespace {
 
 /// The arguments that the opacities' function is chosen from.
-ScalarArguments opacitiesOf(const OpacityArguments& arguments, const ScalarArguments& scalar) {
+ScalarArguments argumentsOfOpacities(const OpacityArguments& arguments, const ScalarArguments& scalar) {
   ScalarArguments of = arguments.by;
   of.prefix = "--opacity-";
   of.opacity = scalar.opacity;
@@ -18,7 +18,7 @@ ScalarArguments opacitiesOf(const OpacityArguments& arguments, const ScalarArgum
   return of;
 }
 
-size_t variableOf(const CacheReader& cache, const OpacityArguments& arguments) {
+size_t opacityVariable(const CacheReader& cache, const OpacityArguments& arguments) {
   try {
     return cache.variableNamed(arguments.by.scalar);
   } catch (const UsageError& error) {
@@ -62,7 +62,7 @@ void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArgume
   if (arguments.by.transfer_function && !arguments.by.transfer_function->ends_with(".json"))
     throw UsageError("--opacity-tf {}: expected a ParaView preset, NAME.json",
                      *arguments.by.transfer_function);
-  checkFunctionArguments(opacitiesOf(arguments, scalar));
+  checkFunctionArguments(argumentsOfOpacities(arguments, scalar));
 }
 
 std::string ScalarChoice::chosenOptions() const {
@@ -79,14 +79,14 @@ ScalarChoice chooseScalars(const OpacityArguments& arguments, const ScalarArgume
     DrawnScalars scalars(shown, picture.function(scalar));
     return {std::move(scalars), std::move(picture), {}};
   }
-  const size_t variable = variableOf(cache, arguments);
+  const size_t variable = opacityVariable(cache, arguments);
   ScalarArguments colours = scalar;
   colours.opacity.reset();
   colours.opacity_unit.reset();
   PictureChoice of_colours(cache, shown, frame.scale, what, maps);
   DrawnScalar colour{shown, of_colours.colours(colours)};
   PictureChoice picture(cache, variable, frame.scale, what, maps);
-  DrawnScalar opacity{variable, picture.opacities(opacitiesOf(arguments, scalar))};
+  DrawnScalar opacity{variable, picture.opacities(argumentsOfOpacities(arguments, scalar))};
   return {DrawnScalars(std::move(opacity), std::move(colour)), std::move(picture),
           of_colours.chosenOptions()};
 }

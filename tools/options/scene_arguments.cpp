@@ -87,7 +87,7 @@ void checkSurfaceOpacities(const SurfaceArguments& arguments, bool has_opacities
 }
 
 /// The parts between the commas of all texts.
-std::vector<std::string> splitAtCommas(const std::vector<std::string>& texts) {
+std::vector<std::string> splitAllAtCommas(const std::vector<std::string>& texts) {
   std::vector<std::string> parts;
   for (const std::string& text : texts)
     for (size_t begin = 0; begin <= text.size();) {
@@ -115,7 +115,7 @@ std::vector<GivenIsovalue> parseIsovalues(const SurfaceArguments& arguments) {
     if (inner != std::string::npos && scalar.find(',', inner) != std::string::npos)
       throw UsageError("--iso {}: has two scalars; give --iso NAME=VALUE,... once for each", text);
     for (const std::string& value :
-         splitAtCommas({text.substr(equals == std::string::npos ? 0 : equals + 1)}))
+         splitAllAtCommas({text.substr(equals == std::string::npos ? 0 : equals + 1)}))
       given.push_back({scalar, parseNumber("--iso", value)});
   }
   return given;
@@ -124,7 +124,7 @@ std::vector<GivenIsovalue> parseIsovalues(const SurfaceArguments& arguments) {
 /// A colour for each isosurface, in their order; empty: all have the function's.
 std::vector<std::optional<glm::vec3>> parseIsoColours(const SurfaceArguments& arguments) {
   std::vector<std::optional<glm::vec3>> colours;
-  for (const std::string& text : splitAtCommas(arguments.iso_colours))
+  for (const std::string& text : splitAllAtCommas(arguments.iso_colours))
     colours.push_back(text == "function" ? std::nullopt : std::optional(parseColour("iso", text)));
   const size_t count = parseIsovalues(arguments).size();
   if (!colours.empty() && count == 0) throw UsageError("--iso-colour needs an isosurface: --iso VALUE");

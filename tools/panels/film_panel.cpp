@@ -24,7 +24,7 @@ ImU32 accent() {
 }
 
 /// A button of the film's; `id` names it for tests.
-bool button(const char* text, const char* id, bool enabled, const char* help) {
+bool filmButton(const char* text, const char* id, bool enabled, const char* help) {
   ImGui::BeginDisabled(!enabled);
   const bool pressed = ImGui::Button(fmt::format("{}##film", text).c_str());
   ImGui::EndDisabled();
@@ -52,18 +52,20 @@ void FilmPanel::draw(const FilmEdit& film, const FilmPictures& pictures, PanelAc
   FilmActions& does = actions.film;
   const bool has_keys = !film.keys().empty(), selects = film.selected().has_value();
   // The buttons stay where they are when the first key frame is added: "add" is pressed again and again.
-  does.add |=
-      button("Add key frame", "add key frame", true, "of what is shown now, after the one that is selected");
+  does.add |= filmButton("Add key frame", "add key frame", true,
+                         "of what is shown now, after the one that is selected");
   ImGui::SameLine();
-  does.replace |= button("Update", "update key frame", selects, "the selected one shows what is shown now");
+  does.replace |=
+      filmButton("Update", "update key frame", selects, "the selected one shows what is shown now");
   ImGui::SameLine();
-  does.remove |= button("Delete", "delete key frame", selects, "the selected one");
+  does.remove |= filmButton("Delete", "delete key frame", selects, "the selected one");
   ImGui::SameLine();
-  does.play |= button(film.isPlaying() ? "Stop" : "Play", "play film", film.end() > film.begin(), nullptr);
-  does.open |= button("Open...", "open film", true, "a file of key frames, as render --path draws it");
+  does.play |=
+      filmButton(film.isPlaying() ? "Stop" : "Play", "play film", film.end() > film.begin(), nullptr);
+  does.open |= filmButton("Open...", "open film", true, "a file of key frames, as render --path draws it");
   ImGui::SameLine();
-  does.save |= button("Save keys...", "save film", has_keys,
-                      "the key frames, for render --path and for the next time");
+  does.save |= filmButton("Save keys...", "save film", has_keys,
+                          "the key frames, for render --path and for the next time");
   ImGui::BeginDisabled(!has_keys);
   commandButton(Command::kSaveFilmMovie, actions, "Save film...");
   ImGui::SameLine();

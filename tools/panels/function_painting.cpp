@@ -15,7 +15,7 @@ constexpr float kPointRadius = 0.38f;  // in lines of text
 constexpr ImU32 kMark = IM_COL32(235, 140, 30, 255);
 constexpr double kHeights[] = {0.05, 0.25, 0.5, 1};  // opacities at the left of the curve
 
-ImU32 toImGui(const glm::dvec3& rgb) {
+ImU32 imGuiColour(const glm::dvec3& rgb) {
   return ImGui::ColorConvertFloat4ToU32(
       {static_cast<float>(rgb.x), static_cast<float>(rgb.y), static_cast<float>(rgb.z), 1});
 }
@@ -87,7 +87,7 @@ void paintCurve(const EditedFunction& function, const std::vector<double>& histo
   for (const OpacityPoint& point : function.points()) {
     const ImVec2 at = canvas.at(point.x, heightOf(point.opacity));
     list->AddCircleFilled(at, kPointRadius * unit,
-                          has_colours ? toImGui(function.colourAt(point.x)) : plotColours().bars);
+                          has_colours ? imGuiColour(function.colourAt(point.x)) : plotColours().bars);
     list->AddCircle(at, kPointRadius * unit, plotColours().edge, 0, 0.08f * unit);
   }
 }
@@ -97,7 +97,7 @@ void paintStrip(const ImVec2& lower, const ImVec2& size, const std::function<glm
   for (float x = 0; x < size.x; x += 2)
     list->AddRectFilled({lower.x + x, lower.y},
                         {std::min(lower.x + x + 2, lower.x + size.x), lower.y + size.y},
-                        toImGui(at(static_cast<double>(x / size.x))));
+                        imGuiColour(at(static_cast<double>(x / size.x))));
 }
 
 float availableWidth() {

@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kBins = 64;
+constexpr size_t kGradientBins = 64;
 constexpr float kHeight = 5;  // in lines of text
 
 /// Opacities that are 0 up to a share of the volume that is less steep, and 1 from another on.
@@ -39,7 +39,8 @@ std::string GradientPanel::updateMagnitudes(const MagnitudesOf& of) {
   magnitudes_.reset();
   pending_ = std::async(std::launch::async, [&cache = cache_, of] {
     const GradientPercentiles percentiles(cache, of.variable, of.scale);
-    return std::make_unique<const Magnitudes>(Magnitudes{percentiles, GradientHistogram(percentiles, kBins)});
+    return std::make_unique<const Magnitudes>(
+        Magnitudes{percentiles, GradientHistogram(percentiles, kGradientBins)});
   });
   return failure;
 }

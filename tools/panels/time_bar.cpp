@@ -49,7 +49,7 @@ void paint(Sign sign, const ImVec2& middle, float size, ImU32 colour) {
   }
 }
 
-void button(Command command, Sign sign, PanelActions& actions) {
+void signButton(Command command, Sign sign, PanelActions& actions) {
   const CommandInfo& info = infoOf(command);
   const float side = ImGui::GetFrameHeight();
   const ImVec2 from = ImGui::GetCursorScreenPos();
@@ -93,11 +93,11 @@ void drawTimeBar(const CacheReader& cache, const Playback& playback, const Recta
   ImGui::Begin("time", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
-  button(Command::kFirstStep, Sign::kFirst, actions);
-  button(Command::kPreviousStep, Sign::kPrevious, actions);
-  button(Command::kPlay, playback.isPlaying() ? Sign::kStop : Sign::kPlay, actions);
-  button(Command::kNextStep, Sign::kNext, actions);
-  button(Command::kLastStep, Sign::kLast, actions);
+  signButton(Command::kFirstStep, Sign::kFirst, actions);
+  signButton(Command::kPreviousStep, Sign::kPrevious, actions);
+  signButton(Command::kPlay, playback.isPlaying() ? Sign::kStop : Sign::kPlay, actions);
+  signButton(Command::kNextStep, Sign::kNext, actions);
+  signButton(Command::kLastStep, Sign::kLast, actions);
 
   const Manifest& series = cache.seriesManifest();
   const double time = cache.series().timeAt(playback.position());

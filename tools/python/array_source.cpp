@@ -19,9 +19,9 @@ namespace py = pybind11;
 namespace curvisplat::python {
 namespace {
 
-using Shape = std::array<uint64_t, 3>;  // k, j, i
+using ArrayShape = std::array<uint64_t, 3>;  // k, j, i
 
-std::string textOf(const Shape& shape) {
+std::string textOf(const ArrayShape& shape) {
   return fmt::format("({}, {}, {})", shape[0], shape[1], shape[2]);
 }
 
@@ -53,7 +53,7 @@ class ArrayView {
     }
   }
 
-  const Shape& shape() const { return shape_; }
+  const ArrayShape& shape() const { return shape_; }
   bool isBool() const { return kind_ == Kind::kBool; }
   bool isDouble() const { return kind_ == Kind::kDouble; }
 
@@ -94,11 +94,11 @@ class ArrayView {
   py::array array_;
   Kind kind_;
   const std::byte* data_;
-  Shape shape_{};
+  ArrayShape shape_{};
   std::array<ptrdiff_t, 3> strides_{};
 };
 
-void requireShape(const ArrayView& array, const Shape& expected, const std::string& what) {
+void requireShape(const ArrayView& array, const ArrayShape& expected, const std::string& what) {
   if (array.shape() != expected)
     throw UsageError("{}: the array has the shape {}; expected {}, as x has", what, textOf(array.shape()),
                      textOf(expected));
@@ -113,7 +113,7 @@ struct BlockViews {
 BlockViews viewsOf(const BlockArrays& block, const ScalarNames& names) {
   const auto named = [&](const char* what) { return fmt::format("{}: {}", block.name, what); };
   BlockViews views{{block.x, named("x")}, {block.y, named("y")}, {block.z, named("z")}, {}, {}};
-  const Shape shape = views.x.shape();
+  const ArrayShape shape = views.x.shape();
   if (std::min({shape[0], shape[1], shape[2]}) == 0)
     throw UsageError("{}: the array has the shape {}; expected at least one node", named("x"), textOf(shape));
   requireShape(views.y, shape, named("y"));
@@ -135,16 +135,16 @@ BlockViews viewsOf(const BlockArrays& block, const ScalarNames& names) {
 }
 
 /// Node or cell, by the shape; throws if it is neither.
-Centring centringOf(const ArrayView& scalar, const Shape& nodes, const std::string& what) {
+Centring centringOf(const ArrayView& scalar, const ArrayShape& nodes, const std::string& what) {
   if (scalar.shape() == nodes) return Centring::kNode;
-  const Shape cells{nodes[0] - 1, nodes[1] - 1, nodes[2] - 1};
+  const ArrayShape cells{nodes[0] - 1, nodes[1] - 1, nodes[2] - 1};
   if (std::min({nodes[0], nodes[1], nodes[2]}) > 1 && scalar.shape() == cells) return Centring::kCell;
   throw UsageError("{}: the array has the shape {}; expected {} (values at nodes) or {} (in cells)", what,
                    textOf(scalar.shape()), textOf(nodes), textOf(cells));
 }
 
 /// Products of larger ones would not fit in 64 bits.
-void requireFewNodes(const Shape& shape) {
+void requireFewNodes(const ArrayShape& shape) {
   uint64_t nodes = 1;
   for (const uint64_t length : shape) {
     if (length > 0 && nodes > (kMaxNodes - 1) / length)
@@ -175,7 +175,7 @@ class ArraySource : public GridSource {
     for (const BlockArrays& block : blocks) {
       views_.push_back(viewsOf(block, names));
       const BlockViews& views = views_.back();
-      const Shape& shape = views.x.shape();
+      const ArrayShape& shape = views.x.shape();
       description_.blocks.push_back({block.name, shape[2], shape[1], shape[0], views.blank.has_value()});
       if (views.x.isDouble() || views.y.isDouble() || views.z.isDouble()) description_.coordinate_bytes = 8;
       for (size_t n = 0; n < names.size(); ++n) {
@@ -232,11 +232,11 @@ class ArraySource : public GridSource {
 
 class CallableSource : public GridSource {
  public:
-  CallableSource(const std::vector<Shape>& shapes, const ScalarNames& names, PythonRead read)
+  CallableSource(const std::vector<ArrayShape>& shapes, const ScalarNames& names, PythonRead read)
       : read_(std::move(read)) {
     description_.format = "a Python callable";
     description_.coordinate_bytes = 8;
-    for (const Shape& shape : shapes) {
+    for (const ArrayShape& shape : shapes) {
       requireFewNodes(shape);
       description_.blocks.push_back(
           {fmt::format("block {}", description_.blocks.size() + 1), shape[2], shape[1], shape[0], true});
@@ -338,7 +338,7 @@ class CallableSource : public GridSource {
     template <typename T>
     void copy(const py::handle& object, const std::string& what, std::vector<T>& out) const {
       const ArrayView view(py::cast<py::array>(object), "read(): " + what);
-      const Shape shape{piece.k1 - piece.k0, piece.j1 - piece.j0, piece.i1 - piece.i0};
+      const ArrayShape shape{piece.k1 - piece.k0, piece.j1 - piece.j0, piece.i1 - piece.i0};
       requireShape(view, shape, "read(): " + what);
       for (uint64_t k = 0; k < shape[0]; ++k)
         for (uint64_t j = 0; j < shape[1]; ++j)

@@ -95,7 +95,7 @@ py::list scalarsOf(OpenCache& cache) {
   return out;
 }
 
-std::array<double, 3> arrayOf(const glm::dvec3& v) {
+std::array<double, 3> coordinatesOf(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
 }
 
@@ -136,8 +136,8 @@ py::list camerasOf(const OpenCache& cache, const Options& camera, const std::str
   py::list out;
   for (uint64_t frame = 0; frame < motion.frames; ++frame) {
     const Camera at = motion.camera(frame);
-    out.append(py::make_tuple(arrayOf(at.position), arrayOf(at.focal_point), arrayOf(at.view_up),
-                              at.parallel_scale));
+    out.append(py::make_tuple(coordinatesOf(at.position), coordinatesOf(at.focal_point),
+                              coordinatesOf(at.view_up), at.parallel_scale));
   }
   return out;
 }
@@ -149,8 +149,8 @@ py::tuple orbitedCamera(const std::array<double, 3>& position, const std::array<
   camera.focal_point = vectorOf(focal_point);
   camera.view_up = vectorOf(view_up);
   const Camera turned = orbited(camera, degrees);
-  return py::make_tuple(py::tuple(py::cast(arrayOf(turned.position))),
-                        py::tuple(py::cast(arrayOf(turned.view_up))));
+  return py::make_tuple(py::tuple(py::cast(coordinatesOf(turned.position))),
+                        py::tuple(py::cast(coordinatesOf(turned.view_up))));
 }
 
 py::tuple probeAt(OpenCache& cache, const std::vector<std::array<double, 3>>& points,
@@ -463,10 +463,10 @@ PYBIND11_MODULE(_core, module) {
       .def_property_readonly("path",
                              [](const OpenCache& cache) { return cache.reader().cachePath().string(); })
       .def_property_readonly("scalars", &scalarsOf)
-      .def_property_readonly("lower",
-                             [](const OpenCache& cache) { return arrayOf(cache.reader().manifest().lower); })
-      .def_property_readonly("upper",
-                             [](const OpenCache& cache) { return arrayOf(cache.reader().manifest().upper); })
+      .def_property_readonly(
+          "lower", [](const OpenCache& cache) { return coordinatesOf(cache.reader().manifest().lower); })
+      .def_property_readonly(
+          "upper", [](const OpenCache& cache) { return coordinatesOf(cache.reader().manifest().upper); })
       .def_property_readonly("title", [](const OpenCache& cache) { return cache.reader().manifest().title; })
       .def_property_readonly("samples",
                              [](const OpenCache& cache) { return cache.reader().manifest().nodes; })

@@ -164,7 +164,7 @@ PictureArguments pictureArguments(const Options& function, const Options& camera
 namespace {
 
 /// A numpy array that owns the image's pixels.
-py::array_t<float> arrayOf(Image image) {
+py::array_t<float> pixelArray(Image image) {
   auto pixels = std::make_unique<std::vector<float>>(std::move(image.rgba));
   const py::capsule owner(pixels.get(), [](void* at) { delete static_cast<std::vector<float>*>(at); });
   const float* data = pixels.release()->data();
@@ -341,7 +341,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
     if (scalars.colour)
       for (const std::string& note : scalars.colour->function.notes()) picture.notes.push_back(note);
   });
-  picture.rgba = arrayOf(std::move(image));
+  picture.rgba = pixelArray(std::move(image));
   for (const ImageChannel& channel : imageChannels(arguments.channels, values, size))
     picture.channels[py::str(channel.name)] =
         py::array_t<float>({size.height, size.width}, channel.values.data());

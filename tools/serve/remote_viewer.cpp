@@ -27,7 +27,7 @@ constexpr size_t kMaxReports =
     16;  // that wait to be read; a page sends as many as there are pictures on their way
 constexpr size_t kMaxAsked = 64;
 
-double clockSeconds() {
+double secondsNow() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
@@ -72,7 +72,7 @@ class RemoteViewer::Work {
 
   /// Answers what has come in.
   void serve(Inbox inbox) {
-    for (const uint64_t picture : inbox.shown) line_.shown(picture, clockSeconds());
+    for (const uint64_t picture : inbox.shown) line_.shown(picture, secondsNow());
     if (inbox.open) answer([&] { return caches_.cacheText(*inbox.open); });
     if (inbox.view) wanted_ = std::move(inbox.view);
     woken_ |= inbox.woken;
@@ -304,7 +304,7 @@ class RemoteViewer::Work {
     header.splats = static_cast<uint32_t>(frame.statistics.splats_drawn);
     std::string message =
         header.is_png ? losslessMessage(header, picture) : jpegMessage(header, picture, line_.quality());
-    line_.sent(header.picture, clockSeconds(), !header.is_png, message.size());
+    line_.sent(header.picture, secondsNow(), !header.is_png, message.size());
     viewer_.send_(std::move(message), false);
   }
 

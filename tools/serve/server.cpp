@@ -21,7 +21,7 @@ namespace {
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
-using ErrorCode = boost::system::error_code;
+using AsioError = boost::system::error_code;
 
 constexpr std::chrono::milliseconds kLookForStop{200};
 constexpr std::chrono::milliseconds kPauseAfterError{100};
@@ -94,7 +94,7 @@ class Server : public ConnectionHost {
   ~Server() override {
     for (const auto& weak : connections_)
       if (const auto connection = weak.lock()) connection->drop();
-    ErrorCode ignored;
+    AsioError ignored;
     acceptor_.close(ignored);
     timer_.cancel();
     pause_.cancel();
@@ -138,7 +138,7 @@ class Server : public ConnectionHost {
 
  private:
   void listen() {
-    ErrorCode error;
+    AsioError error;
     const auto address = asio::ip::make_address(options_.address, error);
     if (error)
       throw UsageError("--listen {}: expected an address of this machine in digits, such as 127.0.0.1",
@@ -154,7 +154,7 @@ class Server : public ConnectionHost {
   }
 
   void accept() {
-    acceptor_.async_accept([this](const ErrorCode& error, tcp::socket socket) {
+    acceptor_.async_accept([this](const AsioError& error, tcp::socket socket) {
       if (!acceptor_.is_open()) return;
       connections_.remove_if([](const auto& weak) { return weak.expired(); });
       // More than may be are not heard; those that wait for a viewer's end count as viewers.
@@ -166,7 +166,7 @@ class Server : public ConnectionHost {
       if (!error) return accept();
       // With no descriptor left, for example, it fails again at once, until a connection ends.
       pause_.expires_after(kPauseAfterError);
-      pause_.async_wait([this](const ErrorCode& stopped) {
+      pause_.async_wait([this](const AsioError& stopped) {
         if (!stopped) accept();
       });
     });
@@ -174,7 +174,7 @@ class Server : public ConnectionHost {
 
   void lookForStop() {
     timer_.expires_after(kLookForStop);
-    timer_.async_wait([this](const ErrorCode& error) {
+    timer_.async_wait([this](const AsioError& error) {
       if (error) return;
       try {
         stopped_.throwIfStopped();

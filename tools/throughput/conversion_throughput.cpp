@@ -22,7 +22,7 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using ConversionJson = nlohmann::ordered_json;
 
 // Bytes on disk per node: 16 for the grid, 67 for scattered splats, up to 13 for the cache (bench/README.md),
 // with a margin; a minimum for small grids.
@@ -208,14 +208,14 @@ Plots conversionPlots(const ConversionReport& report) {
   return {{"conversion.png", drawPlot(std::vector{times, bytes, memory})}};
 }
 
-Json toJson(const ConversionReport& report) {
-  Json json{{"scene", "wake"},
-            {"size", {report.size.ni, report.size.nj, report.size.nk}},
-            {"nodes", report.nodes()},
-            {"grid_files_cold", report.cold},
-            {"threads", report.last.threads},
-            {"memory_bytes", report.last.memory_bytes},
-            {"phases", Json::array()}};
+ConversionJson toJson(const ConversionReport& report) {
+  ConversionJson json{{"scene", "wake"},
+                      {"size", {report.size.ni, report.size.nj, report.size.nk}},
+                      {"nodes", report.nodes()},
+                      {"grid_files_cold", report.cold},
+                      {"threads", report.last.threads},
+                      {"memory_bytes", report.last.memory_bytes},
+                      {"phases", ConversionJson::array()}};
   for (const Progress::Phase& phase : report.phases)
     json["phases"].push_back({{"name", phase.name},
                               {"seconds", phase.seconds},

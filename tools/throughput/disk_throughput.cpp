@@ -18,7 +18,7 @@
 namespace curvisplat {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 using Way = DiskRun::Way;
 
 constexpr uint64_t kMaxBlock = kDiskBlocks.back();
@@ -43,7 +43,7 @@ bool isDirect(Way way) {
 }
 
 /// The part of a file that is measured.
-struct FilePart {
+struct MeasuredPart {
   const DirectFile* file;
   uint64_t bytes;  // from offset 0
 };
@@ -54,9 +54,9 @@ struct Block {
 };
 
 /// All blocks of the parts in a shuffled but fixed order.
-std::vector<Block> blocksOf(std::span<const FilePart> parts, uint64_t block_bytes) {
+std::vector<Block> blocksOf(std::span<const MeasuredPart> parts, uint64_t block_bytes) {
   std::vector<Block> blocks;
-  for (const FilePart& part : parts)
+  for (const MeasuredPart& part : parts)
     for (uint64_t offset = 0; offset < part.bytes; offset += block_bytes)
       blocks.push_back({part.file, offset});
   std::mt19937_64 random(1);
@@ -72,8 +72,8 @@ using Buffer = std::unique_ptr<std::byte, Free>;
 /// Reads `blocks` until all are read or `max_s` seconds have passed. Returns bytes per second.
 double readBlocks(std::span<const Block> blocks, const DiskRun& run, AsyncReads& reads, std::byte* buffer,
                   double max_s) {
-  const auto start = Clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  const auto start = SteadyClock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(SteadyClock::now() - start).count(); };
   std::vector<size_t> block_of(run.depth);  // [tag]
   size_t next = 0;
   unsigned under_way = 0;
@@ -123,7 +123,7 @@ class CacheFiles {
     }
   }
 
-  std::span<const FilePart> parts() const { return parts_; }
+  std::span<const MeasuredPart> parts() const { return parts_; }
   bool areDirect() const {
     return std::all_of(files_.begin(), files_.end(), [](const auto& file) { return file->isDirect(); });
   }
@@ -133,7 +133,7 @@ class CacheFiles {
   /// reason.
   std::optional<std::string> makeWarm() const try {
     std::vector<std::byte> piece(1 << 20);
-    for (const FilePart& part : parts_) {
+    for (const MeasuredPart& part : parts_) {
       const InputFile file(part.file->path());
       for (uint64_t at = 0; at < part.bytes; at += piece.size())
         file.readAt(at, std::span(piece).first(std::min<uint64_t>(piece.size(), part.bytes - at)));
@@ -150,7 +150,7 @@ class CacheFiles {
  private:
   const std::array<std::filesystem::path, 2> paths_;
   std::array<std::unique_ptr<DirectFile>, 2> files_;
-  std::vector<FilePart> parts_;
+  std::vector<MeasuredPart> parts_;
 };
 
 /// Brings the files into the state that `way` requires. Returns nullopt, or the reason if that is impossible.

@@ -11,14 +11,14 @@
 namespace curvisplat {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using FramesJson = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::string sizeText(uint64_t bytes) {
+std::string memoryInName(uint64_t bytes) {
   return bytes % (1 << 20) ? fmt::format("{}B", bytes) : fmt::format("{}MiB", bytes >> 20);
 }
 
@@ -110,7 +110,7 @@ class Frames {
   std::vector<FramesOfConfiguration> done_;
 };
 
-Json toJson(const FrameStatistics& frame) {
+FramesJson toJson(const FrameStatistics& frame) {
   return {{"total_s", frame.total_s},
           {"plan_s", frame.plan_s},
           {"read_s", frame.read_s},
@@ -134,7 +134,7 @@ Json toJson(const FrameStatistics& frame) {
 }  // namespace
 
 std::string FrameConfiguration::name() const {
-  return fmt::format("frames/lod:{}/threads:{}/memory:{}", lod_pixels, threads, sizeText(memory_bytes));
+  return fmt::format("frames/lod:{}/threads:{}/memory:{}", lod_pixels, threads, memoryInName(memory_bytes));
 }
 
 std::vector<FrameConfiguration> frameConfigurations(std::span<const double> lod_pixels, unsigned threads,
@@ -166,15 +166,15 @@ std::vector<FramesOfConfiguration> measureFrames(const ThroughputScene& scene,
   return frames.take();
 }
 
-Json toJson(std::span<const FramesOfConfiguration> frames) {
-  Json json = Json::array();
+FramesJson toJson(std::span<const FramesOfConfiguration> frames) {
+  FramesJson json = FramesJson::array();
   for (const FramesOfConfiguration& one : frames) {
-    Json entry{{"lod_pixels", one.configuration.lod_pixels},
-               {"threads", one.configuration.threads},
-               {"memory_bytes", one.configuration.memory_bytes},
-               {"stream_bytes", one.bytes},
-               {"frames", one.warm.size()},
-               {"median", toJson(medianFrame(one.warm))}};
+    FramesJson entry{{"lod_pixels", one.configuration.lod_pixels},
+                     {"threads", one.configuration.threads},
+                     {"memory_bytes", one.configuration.memory_bytes},
+                     {"stream_bytes", one.bytes},
+                     {"frames", one.warm.size()},
+                     {"median", toJson(medianFrame(one.warm))}};
     if (one.cold) entry["cold"] = toJson(*one.cold);
     json.push_back(std::move(entry));
   }

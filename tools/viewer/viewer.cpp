@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 // New pictures and input end a wait early. Longer waits leave the processor to the renderer when both share
 // it.
-constexpr double kIdleWaitSeconds = 0.5;
+constexpr double kNoViewWaitSeconds = 0.5;
 constexpr int kFramesAfterInput = 2;  // Dear ImGui needs them to settle
 constexpr double kTextStep = 1.125;
 
@@ -67,7 +67,7 @@ class Viewer {
     int frames_to_settle = kFramesAfterInput;
     while (window_.isOpen()) {
       stopped.throwIfStopped();
-      window_.wait(frames_to_settle > 0 ? 0 : opened_.view() ? opened_.view()->wait() : kIdleWaitSeconds);
+      window_.wait(frames_to_settle > 0 ? 0 : opened_.view() ? opened_.view()->wait() : kNoViewWaitSeconds);
       frames_to_settle = window_.takeInput() ? kFramesAfterInput : std::max(0, frames_to_settle - 1);
       update();
     }

@@ -75,12 +75,12 @@ GlFunctions glOfCurrentContext() {
   return GlFunctions([](const char* name) { return reinterpret_cast<void*>(glfwGetProcAddress(name)); });
 }
 
-std::string textOf(const GlFunctions& gl, GLenum name) {
+std::string glText(const GlFunctions& gl, GLenum name) {
   return reinterpret_cast<const char*>(gl.GetString(name));
 }
 
 std::string nameOf(const GlFunctions& gl) {
-  return fmt::format("{}, {}", textOf(gl, GL_VERSION), textOf(gl, GL_RENDERER));
+  return fmt::format("{}, {}", glText(gl, GL_VERSION), glText(gl, GL_RENDERER));
 }
 
 std::string displayName() {
@@ -177,7 +177,7 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   glfwSwapInterval(1);
   gl_ = std::make_unique<GlFunctions>(glOfCurrentContext());
   context_name_ = nameOf(*gl_);
-  shared_ = std::make_unique<SharedContext>(textOf(*gl_, GL_RENDERER));
+  shared_ = std::make_unique<SharedContext>(glText(*gl_, GL_RENDERER));
   glfwSetWindowUserPointer(window_, this);
   // Dear ImGui installs its callbacks later and calls these from them.
   glfwSetKeyCallback(window_, onKey);

@@ -12,7 +12,7 @@ namespace curvisplat {
 namespace {
 
 constexpr int kMaxDepth = 16;
-constexpr size_t kMaxNodes = 20'000;
+constexpr size_t kMaxVisited = 20'000;
 constexpr uint64_t kSmall = 4096;  // values that are read as a whole
 
 /// The first and the last value, or all.
@@ -34,7 +34,7 @@ void readValues(const CgnsFile& file, const CgnsNode& node, const CgnsShape& sha
 
 /// Errors end the visit of a node, not of those beside it.
 void visit(const CgnsFile& file, const CgnsNode& node, int depth, size_t& visited) {
-  if (depth > kMaxDepth || ++visited > kMaxNodes) return;
+  if (depth > kMaxDepth || ++visited > kMaxVisited) return;
   try {
     if (depth > 0) readValues(file, node, file.shape(node));
   } catch (const Error&) {

@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kChunk = 65536;
+constexpr uint64_t kElementsAtOnce = 65536;
 // Elements of the highest order that CGNS knows have 125 nodes and a type.
 constexpr int64_t kMaxNumbers = 126;
 
@@ -80,8 +80,8 @@ void CgnsCells::countCells(const CgnsSection& section) {
     if (kind.nodes > cornersOf(kind.cell)) counts_.curved += section.elements;
   }
   if (section.type != kCgnsMixed) return;
-  for (uint64_t first = 0; first < section.elements; first += kChunk / 8) {
-    const uint64_t count = std::min(kChunk / 8, section.elements - first);
+  for (uint64_t first = 0; first < section.elements; first += kElementsAtOnce / 8) {
+    const uint64_t count = std::min(kElementsAtOnce / 8, section.elements - first);
     const std::vector<int64_t> begins = integersOf(section.begins, first, count + 1);
     if (static_cast<uint64_t>(begins.back() - begins.front()) > count * kMaxNumbers)
       throw Error("{}: {} has {} numbers for {} elements; the file is damaged", file_, section.path,
@@ -113,9 +113,9 @@ void CgnsCells::findCellsOfFaces(const ListSpools& spools) {
   const auto forEachCell = [&](const auto& use) {
     for (size_t n = 0; n < faces_.size(); ++n)
       for (uint64_t side = 0; side < 2; ++side)
-        for (uint64_t first = 0; first < faces_[n]->elements; first += kChunk) {
+        for (uint64_t first = 0; first < faces_[n]->elements; first += kElementsAtOnce) {
           // ParentData has as many rows as elements, and more columns.
-          const uint64_t count = std::min(kChunk, faces_[n]->elements - first);
+          const uint64_t count = std::min(kElementsAtOnce, faces_[n]->elements - first);
           const std::vector<int64_t> cells =
               integersOf(faces_[n]->parents, side * faces_[n]->elements + first, count);
           for (size_t face = 0; face < count; ++face)

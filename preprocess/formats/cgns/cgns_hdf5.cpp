@@ -20,7 +20,7 @@ constexpr const char* kOldVersion = " version";
 constexpr const char* kLibraryVersion = "CGNSLibraryVersion";
 constexpr int kMaxLinks = 100;
 // Smallest size of a node in a file: a link, and a group with three attributes.
-constexpr uint64_t kMinNodeBytes = 32;
+constexpr uint64_t kMinGroupBytes = 32;
 constexpr uint64_t kSmallFileNodes = 4096;
 constexpr size_t kTriedNodes = 5000;
 
@@ -143,7 +143,7 @@ void CgnsHdf5::count(const Hdf5Group& group, size_t nodes, const std::string& no
     files_bytes_ += bytes;
   }
   nodes_listed_ += nodes;
-  const uint64_t most = kSmallFileNodes + files_bytes_ / kMinNodeBytes;
+  const uint64_t most = kSmallFileNodes + files_bytes_ / kMinGroupBytes;
   if (nodes_listed_ > most)
     damaged(node_path, fmt::format("has {} child nodes, which makes {} in all, more than the files can hold",
                                    nodes, nodes_listed_));

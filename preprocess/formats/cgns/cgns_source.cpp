@@ -27,7 +27,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kNamesListed = 3;
+constexpr size_t kZonesListed = 3;
 
 /// The arrays of a scalar on a zone: one, or three for the magnitude of a vector. Empty: the scalar is NaN.
 /// The file's CgnsTree owns the arrays.
@@ -132,9 +132,9 @@ void warnOfGaps(const CgnsTree& tree, const ArraysOfScalars& arrays_of, GridDesc
   }
   for (const auto& [zones, scalars] : gaps) {
     std::string names;
-    for (size_t n = 0; n < std::min(kNamesListed, zones.size()); ++n)
+    for (size_t n = 0; n < std::min(kZonesListed, zones.size()); ++n)
       names += (n ? ", " : "") + zoneName(tree, zones[n]);
-    if (zones.size() > kNamesListed) names += fmt::format(" and {} more", zones.size() - kNamesListed);
+    if (zones.size() > kZonesListed) names += fmt::format(" and {} more", zones.size() - kZonesListed);
     description.warnings.push_back(fmt::format("{} of {} zones ({}) have no {}; they are not drawn with it",
                                                zones.size(), tree.zones.size(), names, listed(scalars)));
   }

@@ -20,7 +20,7 @@ namespace {
 using namespace std::string_view_literals;
 namespace fs = std::filesystem;
 
-constexpr size_t kBufferBytes = size_t{1} << 20;
+constexpr size_t kPackedBytesAtOnce = size_t{1} << 20;
 constexpr std::string_view kGzip = "\x1f\x8b"sv,
                            kXz =
                                "\xfd"
@@ -30,7 +30,7 @@ constexpr std::string_view kGzip = "\x1f\x8b"sv,
 /// The bytes of the compressed file, in order.
 class Input {
  public:
-  explicit Input(const InputFile& file) : file_(file), buffer_(kBufferBytes) {}
+  explicit Input(const InputFile& file) : file_(file), buffer_(kPackedBytesAtOnce) {}
 
   /// The next bytes; empty at the end.
   std::span<std::byte> next() {
@@ -71,7 +71,7 @@ struct GzipStream {
 void unpackGzip(Input& input, const Sink& sink) {
   GzipStream gzip;
   if (!gzip.open) input.fail("gzip", "no memory");
-  std::vector<std::byte> out(kBufferBytes);
+  std::vector<std::byte> out(kPackedBytesAtOnce);
   bool complete = false;
   for (std::span<std::byte> in = input.next(); !in.empty(); in = input.next()) {
     gzip.stream.next_in = reinterpret_cast<Bytef*>(in.data());
@@ -105,7 +105,7 @@ void unpackXz(Input& input, const Sink& sink) {
   XzStream xz;
   if (lzma_stream_decoder(&xz.stream, kUnpackingMemory, LZMA_CONCATENATED) != LZMA_OK)
     input.fail("xz", "no memory");
-  std::vector<std::byte> out(kBufferBytes);
+  std::vector<std::byte> out(kPackedBytesAtOnce);
   lzma_ret status = LZMA_OK;
   while (status != LZMA_STREAM_END) {
     if (xz.stream.avail_in == 0 && !input.ended()) {
@@ -143,7 +143,7 @@ void unpackZstd(Input& input, const Sink& sink) {
   const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> zstd(ZSTD_createDStream(),
                                                                         &ZSTD_freeDStream);
   if (!zstd) input.fail("zstd", "no memory");
-  std::vector<std::byte> out(kBufferBytes);
+  std::vector<std::byte> out(kPackedBytesAtOnce);
   size_t left = 1;
   for (std::span<std::byte> bytes = input.next(); !bytes.empty(); bytes = input.next()) {
     ZSTD_inBuffer from{bytes.data(), bytes.size(), 0};

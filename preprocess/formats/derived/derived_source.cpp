@@ -13,7 +13,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoInput = std::numeric_limits<double>::quiet_NaN();
 constexpr uint64_t kPieceNodes = 48 << 10;
 /// Inputs that a sample's own values give, without its neighbours.
 constexpr unsigned kOwn = kNeedsDensity | kNeedsVelocity | kNeedsPressure;
@@ -180,9 +180,9 @@ void DerivedMeshSource::derive(std::span<const uint32_t> scalars, const std::vec
     for (size_t n = 0; n < derived[s].size(); ++n) {
       const auto input = [&](const std::optional<uint32_t>& scalar) {
         const size_t place = scalar ? placeOf(*scalar) : read.size();
-        if (place == read.size()) return kNone;
+        if (place == read.size()) return kNoInput;
         const float value = values[place][n];
-        return blank_value_ && value == *blank_value_ ? kNone : double{value};
+        return blank_value_ && value == *blank_value_ ? kNoInput : double{value};
       };
       derived[s][n] =
           static_cast<float>(flowQuantity(quantity.quantity, flowFrom(inputs_, gas_, input), {}, gas_, 0));

@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kChunk = 65536;
+constexpr uint64_t kLengthsAtOnce = 65536;
 constexpr uint64_t kMaxAxis = 1 << 24;  // nodes along an axis of a rectilinear part, which are kept in memory
 constexpr uint64_t kMaxPoints = 1ull << 31;
 
@@ -105,8 +105,8 @@ SpooledNumbers GeometryReader::beginsOf(const EnsightList& lengths) {
   file_.finish();
   uint64_t total = 0;
   std::vector<double> values;
-  for (uint64_t first = 0; first < lengths.count; first += kChunk) {
-    values.resize(std::min(kChunk, lengths.count - first));
+  for (uint64_t first = 0; first < lengths.count; first += kLengthsAtOnce) {
+    values.resize(std::min(kLengthsAtOnce, lengths.count - first));
     lengths.read(first, std::span(values));
     for (const double value : values) {
       begins.add(total);

@@ -9,7 +9,7 @@ namespace curvisplat {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr uint64_t kAtOnce = 65536, kSamplesAtOnce = 1 << 20;
+constexpr uint64_t kRecordsAtOnce = 65536, kSamplesAtOnce = 1 << 20;
 constexpr uint64_t kMaxNodesOfElement = 1331;
 
 /// The values of some samples, [sample * components + component], from the sample `first` on.
@@ -66,8 +66,8 @@ void addSection(GmshReader& reader, const GmshData& data, const GmshSamples& sam
   const bool by_nodes = data.centring == Centring::kNode && !data.at_nodes_of_elements;
   Records records;
   reader.seek(data.offset);
-  for (uint64_t n = 0; n < data.count; n += kAtOnce) {
-    readRecords(reader, data, std::min(kAtOnce, data.count - n), records);
+  for (uint64_t n = 0; n < data.count; n += kRecordsAtOnce) {
+    readRecords(reader, data, std::min(kRecordsAtOnce, data.count - n), records);
     (by_nodes ? samples.nodes : samples.elements).replace(records.numbers);
     for (size_t k = 0; k < records.numbers.size(); ++k) {
       const auto values = std::span<const double>(records.values)

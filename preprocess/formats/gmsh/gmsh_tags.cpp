@@ -9,7 +9,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kAtOnce = 65536, kTableAtOnce = 1 << 20, kMaxGap = 512;
+constexpr uint64_t kTagsAtOnce = 65536, kTableAtOnce = 1 << 20, kMaxGap = 512;
 
 }  // namespace
 
@@ -25,7 +25,7 @@ void GmshTags::finish() {
     part.assign(std::min(kTableAtOnce, last_ - begin + 1), kNowhere);
     uint64_t next = 0;
     for (uint64_t n = 0; n < tags.count; n += some.size()) {
-      some.resize(std::min(kAtOnce, tags.count - n));
+      some.resize(std::min(kTagsAtOnce, tags.count - n));
       tags.read(n, std::span(some));
       for (const uint64_t stored : some) {
         next += (stored & kAnother) == 0 ? 1 : 0;

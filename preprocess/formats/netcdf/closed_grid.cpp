@@ -21,7 +21,7 @@ constexpr uint64_t kRowsLookedAt = 9;
 constexpr double kMinMatching = 0.9;
 // Nodes that are read at a time where parts of rows are put together from several places, which bounds the
 // buffers.
-constexpr uint64_t kNodesAtATime = 1 << 16;
+constexpr uint64_t kRowNodesAtATime = 1 << 16;
 
 /// A row of points, of which a part is in memory.
 class Row {
@@ -31,8 +31,8 @@ class Row {
   uint64_t size() const { return count_; }
   glm::dvec3 at(uint64_t n) {
     if (n - begin_ >= part_.size()) {  // or n < begin_
-      begin_ = n / kNodesAtATime * kNodesAtATime;
-      part_ = (*points_)(j_, begin_, std::min(begin_ + kNodesAtATime, count_));
+      begin_ = n / kRowNodesAtATime * kRowNodesAtATime;
+      part_ = (*points_)(j_, begin_, std::min(begin_ + kRowNodesAtATime, count_));
     }
     return part_[n - begin_];
   }
@@ -294,8 +294,8 @@ void ClosedGrid::readParts(uint32_t block, const NodeBox& box, std::span<const u
   };
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j)
-      for (uint64_t i = box.i0; i < end; i += kNodesAtATime)
-        for (const Columns& columns : columnsOf(i, std::min(i + kNodesAtATime, end), j >= nj_))
+      for (uint64_t i = box.i0; i < end; i += kRowNodesAtATime)
+        for (const Columns& columns : columnsOf(i, std::min(i + kRowNodesAtATime, end), j >= nj_))
           readRow(columns, j, k);
   blankHalfRow(box, out);
 }

@@ -67,7 +67,7 @@ struct FaceShape {
 using EdgePoints = std::function<std::vector<glm::dvec3>(const FaceEdge& edge, uint64_t inwards)>;
 
 using Side = FaceEdge::Side;
-using Row = std::vector<glm::dvec3>;
+using PointRow = std::vector<glm::dvec3>;
 
 constexpr std::array<Side, 4> kSides{Side::kFirstI, Side::kLastI, Side::kFirstJ, Side::kLastJ};
 // Nodes of two edges are a step apart if their distance is this many of the face's own steps. At the corners
@@ -81,7 +81,7 @@ constexpr size_t kMinNodesAround = 5;
 
 struct Edge {
   FaceEdge edge;
-  Row row;
+  PointRow row;
   std::vector<double> steps;  // to the next row inwards
 };
 
@@ -131,7 +131,7 @@ std::vector<FaceJoint> nearestJoints(const std::vector<Edge>& edges, const FaceS
 }
 
 /// The number of a corner among all: four for each face.
-size_t numberOf(const FaceEdge& edge, bool at_end) {
+size_t cornerNumber(const FaceEdge& edge, bool at_end) {
   const bool last_i = edge.alongJ() ? edge.last() : at_end, last_j = edge.alongJ() ? at_end : edge.last();
   return 4 * size_t{edge.face} + (last_i ? 1 : 0) + (last_j ? 2 : 0);
 }
@@ -141,7 +141,7 @@ std::vector<std::vector<FaceCorner>> holesBetween(const std::vector<FaceJoint>& 
   std::vector<std::vector<size_t>> links(4 * size_t{faces});
   for (const FaceJoint& joint : joints)
     for (const bool at_end : {false, true}) {
-      const size_t a = numberOf(joint.a, at_end), b = numberOf(joint.b, at_end != joint.reversed);
+      const size_t a = cornerNumber(joint.a, at_end), b = cornerNumber(joint.b, at_end != joint.reversed);
       links[a].push_back(b);
       links[b].push_back(a);
     }
@@ -171,7 +171,7 @@ FaceJoints jointsOf(const FaceShape& shape, const EdgePoints& points) {
   for (uint32_t face = 0; face < shape.faces; ++face)
     for (const Side side : kSides) {
       Edge edge{{face, side}, points({face, side}, 0), {}};
-      const Row inner = points({face, side}, 1);
+      const PointRow inner = points({face, side}, 1);
       for (size_t n = 0; n < edge.row.size(); ++n)
         edge.steps.push_back(glm::distance(edge.row[n], inner.at(n)));
       edges.push_back(std::move(edge));
@@ -183,7 +183,7 @@ FaceJoints jointsOf(const FaceShape& shape, const EdgePoints& points) {
 }
 
 // Nodes of an edge are read for this many at a time, which bounds the buffers.
-constexpr uint64_t kNodesAtATime = 1 << 16;
+constexpr uint64_t kEdgeNodesAtATime = 1 << 16;
 // Points of all edges, which are compared in memory: 32 MiB. A cubed sphere of 1 km has a fifth of them.
 constexpr uint64_t kMaxEdgePoints = 1 << 20;
 
@@ -315,7 +315,7 @@ class JoinedFaces final : public ForwardingGrid {
   void readJoint(const FaceJoint& joint, const NodeBox& box, std::span<const uint32_t> scalars,
                  NodeArrays& out) const {
     const uint64_t length = lengthOf(joint.a), rows = box.j1 - box.j0;
-    const uint64_t piece = std::max<uint64_t>(1, kNodesAtATime / rows);
+    const uint64_t piece = std::max<uint64_t>(1, kEdgeNodesAtATime / rows);
     const bool backwards_a = !joint.a.alongJ(), backwards_b = backwards_a != joint.reversed;
     for (uint64_t k = box.k0; k < box.k1; k += piece) {
       const uint64_t k1 = std::min(k + piece, box.k1);

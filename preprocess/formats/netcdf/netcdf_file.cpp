@@ -26,8 +26,8 @@ constexpr size_t kChunkCacheSlots = 1009;
 constexpr float kChunkCachePreemption = 0.75f;
 // Limit for attributes: they hold descriptions, not data.
 constexpr size_t kMaxAttributeValues = size_t{1} << 20;
-constexpr double kMaxTextBytes = 1 << 24;
-constexpr double kMaxStrings = 1 << 16;
+constexpr double kMaxAttributeBytes = 1 << 24;
+constexpr double kMaxAttributeStrings = 1 << 16;
 // Deflate shrinks zeros to about a thousandth.
 constexpr double kMaxCompression = 1100;
 constexpr const char* kNetcdf4 = "NetCDF-4";
@@ -276,7 +276,7 @@ std::string NetcdfFile::readText(const NetcdfVariable& variable) const {
     count.push_back(dimensions_.at(dim).length);
     bytes *= static_cast<double>(count.back());
   }
-  if (variable.type != NC_CHAR || bytes > kMaxTextBytes) return "";
+  if (variable.type != NC_CHAR || bytes > kMaxAttributeBytes) return "";
   std::string text(static_cast<size_t>(bytes), ' ');
   const QuietHdf5 quiet;
   const int status = nc_get_vara_text(opened(), variable.id, start.data(), count.data(), text.data());
@@ -293,7 +293,7 @@ std::vector<std::string> NetcdfFile::readStrings(const NetcdfVariable& variable)
     if (variable.type == NC_STRING || n + 1 < dims.size()) strings *= static_cast<double>(all.count[n]);
   }
   std::vector<std::string> found;
-  if (strings > kMaxStrings) return found;
+  if (strings > kMaxAttributeStrings) return found;
   if (variable.type == NC_STRING) {
     std::vector<char*> stored(static_cast<size_t>(strings), nullptr);
     const QuietHdf5 quiet;

@@ -17,7 +17,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kNamesListed = 3, kValuesListed = 12;
+constexpr size_t kRepeatsListed = 3, kValuesListed = 12;
 constexpr size_t kMaxValues = 1 << 20;  // of a dimension of which one is chosen
 constexpr double kNearValue = 1e-6;     // of itself: coordinates may be in single precision
 
@@ -146,7 +146,7 @@ void NetcdfFiles::add(size_t number) {
   }
   if (twice.empty()) return;
   warnings_.push_back(fmt::format("left out: {} of {}: an earlier file has the same variables",
-                                  listed(twice, kNamesListed), file.path().string()));
+                                  listed(twice, kRepeatsListed), file.path().string()));
 }
 
 std::vector<std::string> NetcdfFiles::paths() const {

@@ -24,7 +24,7 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
-constexpr size_t kMaxTextBytes = 16 << 20;
+constexpr size_t kMaxVariableChunkBytes = 16 << 20;
 constexpr size_t kChecksumBytes = 4;
 constexpr bool kSwap = kMachineByteOrder == ByteOrder::kBig;
 
@@ -154,7 +154,7 @@ constexpr NamedDecoder kDecoders[] = {{ZarrCodec::Kind::kZlib, "zlib", decodeZli
 
 Bytes decodedZarr(const ZarrArray& array, Bytes bytes, const std::string& place) {
   const bool variable = array.value_bytes == 0;
-  const size_t expected = variable ? kMaxTextBytes : array.chunkBytes();
+  const size_t expected = variable ? kMaxVariableChunkBytes : array.chunkBytes();
   for (size_t n = array.codecs.size(); n-- > 0;) {
     const ZarrCodec::Kind kind = array.codecs[n].kind;
     if (kind == ZarrCodec::Kind::kShuffle) {

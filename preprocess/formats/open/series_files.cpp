@@ -121,7 +121,7 @@ const fs::path& fileAt(const std::vector<fs::path>& files, size_t step) {
 }
 
 /// A number, or `otherwise` for an empty text.
-std::optional<uint64_t> numberOf(std::string_view text) {
+std::optional<uint64_t> parsedNumber(std::string_view text) {
   uint64_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
@@ -162,7 +162,7 @@ StepSelection parseSteps(const std::string& option, const std::string& text) {
   if (parts.size() > 3 || (parts.size() == 1 && parts[0].empty())) fail();
   for (size_t n = 0; n < parts.size(); ++n) {
     if (parts[n].empty()) continue;
-    const auto number = numberOf(parts[n]);
+    const auto number = parsedNumber(parts[n]);
     if (!number || (n == 2 && *number == 0)) fail();
     if (n == 0) selection.first = *number;
     if (n == 1 || parts.size() == 1) selection.last = *number;

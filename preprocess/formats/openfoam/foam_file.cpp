@@ -13,16 +13,16 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kChunk = 32768;  // numbers
+constexpr size_t kNumbersAtOnce = 32768;  // numbers
 
 /// A list goes to its sink in chunks.
 template <typename Number>
 class Chunks {
  public:
-  explicit Chunks(const SpoolFile::Sink& sink) : sink_(&sink) { numbers_.reserve(kChunk); }
+  explicit Chunks(const SpoolFile::Sink& sink) : sink_(&sink) { numbers_.reserve(kNumbersAtOnce); }
   void add(Number number) {
     numbers_.push_back(number);
-    if (numbers_.size() == kChunk) flush();
+    if (numbers_.size() == kNumbersAtOnce) flush();
   }
   void flush() {
     if (!numbers_.empty()) (*sink_)(std::as_bytes(std::span(numbers_)));
@@ -66,7 +66,7 @@ struct FoamFile::Parser final : FoamParser {
                        end() - begin));
     std::vector<std::byte> some;
     for (uint64_t done = 0; done < count;) {
-      const uint64_t numbers = std::min<uint64_t>(kChunk, count - done);
+      const uint64_t numbers = std::min<uint64_t>(kNumbersAtOnce, count - done);
       some.resize(numbers * width);
       file().readAt(begin + done * width, std::span(some));
       use(some, width);

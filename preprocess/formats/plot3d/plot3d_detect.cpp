@@ -189,7 +189,7 @@ std::string decidingOptions(const std::vector<Plot3dFit>& fits) {
   return options;
 }
 
-std::string describe(const std::vector<Plot3dKind>& kinds) {
+std::string kindsText(const std::vector<Plot3dKind>& kinds) {
   std::string words;
   for (const Plot3dKind kind : kinds) words += (words.empty() ? "" : " or ") + curvisplat::describe(kind);
   return words;
@@ -201,7 +201,7 @@ class Detection {
   Detection(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
             const std::filesystem::path& temporary_folder, std::vector<Plot3dKind> kinds)
       : path_(file->path().string()), force_(force) {
-    if (file->size() == 0) throw Error("{}: is empty; expected a PLOT3D {}", path_, describe(kinds));
+    if (file->size() == 0) throw Error("{}: is empty; expected a PLOT3D {}", path_, kindsText(kinds));
     CURVISPLAT_CHECK(!force.precision_bytes || *force.precision_bytes == 4 || *force.precision_bytes == 8);
     file_size_ = file->size();
     candidates_ = {file, file_size_, force.ascii.value_or(looksLikeText(*file)), std::move(kinds), force};
@@ -311,7 +311,7 @@ class Detection {
 
   [[noreturn]] void failUnfit(std::vector<Plot3dMisfit> misfits,
                               const std::vector<Plot3dBlock>* grid_blocks) const {
-    const std::string expected = describe(candidates_.kinds);
+    const std::string expected = kindsText(candidates_.kinds);
     const auto rank = [&](const Plot3dMisfit& misfit) {
       const bool of_grid = grid_blocks && sameDimensions(misfit.blocks, *grid_blocks);
       const bool markers_agree = misfit.layout.records != RecordMarkers::kNone;

@@ -44,7 +44,7 @@ std::vector<Plot3dLayout> variants(const Plot3dLayout& base, const Plot3dForce& 
   return all;
 }
 
-std::string describe(const Plot3dBlock& block) {
+std::string sizeText(const Plot3dBlock& block) {
   return fmt::format("{}x{}x{}", block.ni, block.nj, block.nk);
 }
 
@@ -72,7 +72,7 @@ std::vector<std::vector<uint64_t>> hopRecords(PayloadFile& payload, const Plot3d
         records[b].push_back(payload.nextRecord());
       } catch (const RecordMismatch& mismatch) {
         throw LayoutMisfit{LayoutMisfit::kDimensions, fmt::format("block {} of {} nodes: {}", b + 1,
-                                                                  describe(blocks[b]), mismatch.what())};
+                                                                  sizeText(blocks[b]), mismatch.what())};
       }
     }
   }
@@ -104,10 +104,10 @@ void fitRecords(const std::vector<Plot3dLayout>& layouts, PayloadFile payload, c
           LayoutMisfit::kKnownStructure,
           fmt::format("block {} of {} nodes has a record for each k-plane; expected the whole format (one "
                       "record per block)",
-                      b + 1, describe(block))};
+                      b + 1, sizeText(block))};
     throw LayoutMisfit{LayoutMisfit::kDimensions,
                        fmt::format("block {} of {} nodes has a record of {} bytes; expected {}", b + 1,
-                                   describe(block), records[b].back(), expectations(layouts, expected))};
+                                   sizeText(block), records[b].back(), expectations(layouts, expected))};
   }
   bool fits = false;
   for (const Plot3dLayout& layout : layouts) {

@@ -106,9 +106,9 @@ bool isOfCells(const TecplotValues& values) {
   return values.centring == Centring::kCell;
 }
 
-class Reader {
+class ZoneReader {
  public:
-  Reader(std::shared_ptr<const PooledFile> file, int version, bool has_packing)
+  ZoneReader(std::shared_ptr<const PooledFile> file, int version, bool has_packing)
       : words_(std::move(file)), version_(version), has_packing_(has_packing) {}
 
   TecplotData run() {
@@ -395,12 +395,12 @@ bool isTecplotBinary(const InputFile& file) {
 
 TecplotData readTecplotBinary(const std::shared_ptr<const PooledFile>& file) {
   const int version = versionOf(*file);
-  if (version < 112) return Reader(file, version, true).run();
+  if (version < 112) return ZoneReader(file, version, true).run();
   try {
-    return Reader(file, version, false).run();
+    return ZoneReader(file, version, false).run();
   } catch (const Error&) {
     try {
-      return Reader(file, version, true).run();
+      return ZoneReader(file, version, true).run();
     } catch (const Error&) {
     }
     throw;

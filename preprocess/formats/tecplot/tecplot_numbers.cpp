@@ -16,7 +16,7 @@ constexpr uint64_t kMaxNumbers = uint64_t{1} << 40;
 
 /// Numbers that a word stands for: "1.5", "3*1.5", "1,2,3". Calls add(value, times). False if it is none.
 template <typename Add>
-bool forEachNumber(std::string_view word, const Add& add) {
+bool forEachNumberOfWord(std::string_view word, const Add& add) {
   while (!word.empty()) {
     const size_t comma = std::min(word.find(','), word.size());
     std::string_view number = word.substr(0, comma);
@@ -58,7 +58,7 @@ FilePart countTecplotNumbers(TextReader& text) {
       return numbers;
     }
     const uint64_t before = count;
-    forEachNumber(word, [&](std::string_view number, uint64_t times) {
+    forEachNumberOfWord(word, [&](std::string_view number, uint64_t times) {
       count += std::min(times, kMaxNumbers);
       if (sampled++ < kDigitSamples) numbers.digits = std::max(numbers.digits, significantDigits(number));
       return true;
@@ -85,15 +85,16 @@ void spoolTecplotNumbers(const std::shared_ptr<const PooledFile>& file, uint64_t
       text.line();
       continue;
     }
-    const bool numbers = !word.empty() && forEachNumber(word, [&](std::string_view number, uint64_t times) {
-      double value = 0;
-      if (!parseNumber(number, value)) return false;
-      for (uint64_t n = 0; n < times && left > 0; ++n, --left) {
-        pending.push_back(value);
-        if (pending.size() == kPending) flush();
-      }
-      return true;
-    });
+    const bool numbers =
+        !word.empty() && forEachNumberOfWord(word, [&](std::string_view number, uint64_t times) {
+          double value = 0;
+          if (!parseNumber(number, value)) return false;
+          for (uint64_t n = 0; n < times && left > 0; ++n, --left) {
+            pending.push_back(value);
+            if (pending.size() == kPending) flush();
+          }
+          return true;
+        });
     if (!numbers)
       throw Error("{}: byte {}: found \"{}\"; expected a number", file->name(), text.offset(),
                   printable(text.peekWord().substr(0, 30)));

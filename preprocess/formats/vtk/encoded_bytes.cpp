@@ -49,7 +49,7 @@ size_t decodeFour(const std::byte* from, std::array<std::byte, 3>& to) {
   return bytes;
 }
 
-bool isSpace(std::byte c) {
+bool isSpaceByte(std::byte c) {
   return c == std::byte{' '} || (c >= std::byte{'\t'} && c <= std::byte{'\r'});
 }
 
@@ -72,9 +72,9 @@ void Base64Bytes::findLines() {
   std::array<std::byte, 4096> text;
   const auto some = std::span(text).first(std::min<uint64_t>(text.size(), std::max(end_, begin_) - begin_));
   file_->readAt(begin_, some);
-  const auto first = std::find_if(some.begin(), some.end(), isSpace);
-  const auto next = std::find_if_not(first, some.end(), isSpace);
-  const auto last = std::find_if(next, some.end(), isSpace);
+  const auto first = std::find_if(some.begin(), some.end(), isSpaceByte);
+  const auto next = std::find_if_not(first, some.end(), isSpaceByte);
+  const auto last = std::find_if(next, some.end(), isSpaceByte);
   const auto length = static_cast<uint64_t>(first - some.begin()), line = static_cast<uint64_t>(last - next);
   if (next == some.end() || length % 4 != 0 || length == 0 || line % 4 != 0) return;
   first_ = length;
@@ -117,7 +117,7 @@ void Base64Bytes::readAt(uint64_t offset, std::span<std::byte> to) const {
       const std::byte* const group = &text[4 * n];
       const size_t count = decodeFour(group, bytes);
       const size_t used = std::min(3 - skipped, to.size());
-      if (count == 0 && std::any_of(group, group + 4, isSpace))
+      if (count == 0 && std::any_of(group, group + 4, isSpaceByte))
         throw Error(
             "{}: byte {}: not valid base64: it is broken into lines of several lengths; write it without "
             "line breaks",

@@ -21,16 +21,16 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kChunk = 65536;
+constexpr uint64_t kTuplesAtOnce = 65536;
 constexpr double kMaxCoordinate = 1e38;  // differences of two are finite in single precision
-constexpr uint64_t kMaxPoints = std::numeric_limits<uint32_t>::max() - 1;
+constexpr uint64_t kMaxCurvePoints = std::numeric_limits<uint32_t>::max() - 1;
 
 /// All tuples of an array's wanted components, one after the other.
 std::vector<std::vector<double>> allOf(const VtkArray& array, std::span<const int> components) {
   std::vector<std::vector<double>> values(components.size());
-  std::vector<std::vector<double>> chunk(components.size(), std::vector<double>(kChunk));
-  for (uint64_t first = 0; first < array.tuples; first += kChunk) {
-    const uint64_t count = std::min(kChunk, array.tuples - first);
+  std::vector<std::vector<double>> chunk(components.size(), std::vector<double>(kTuplesAtOnce));
+  for (uint64_t first = 0; first < array.tuples; first += kTuplesAtOnce) {
+    const uint64_t count = std::min(kTuplesAtOnce, array.tuples - first);
     std::vector<WantedComponent<double>> wanted;
     for (size_t c = 0; c < components.size(); ++c) wanted.push_back({components[c], chunk[c].data()});
     readTuples<double>(array, first, count, wanted);
@@ -70,7 +70,7 @@ class Collector {
         if (!(std::abs(at[axis]) <= kMaxCoordinate))
           fail(fmt::format("a point has the coordinate {:g}; expected a number up to {:g}", at[axis],
                            kMaxCoordinate));
-      if (curves_.points.size() >= kMaxPoints) fail("has too many points");
+      if (curves_.points.size() >= kMaxCurvePoints) fail("has too many points");
       curves_.points.push_back(at);
       if (!scalar_.empty())
         curves_.values.push_back(static_cast<float>(of_points.empty() ? of_cell : of_points[n]));

@@ -150,8 +150,8 @@ std::vector<std::vector<VtkExtent>> refinedCellsOf(const std::vector<AmrPatch>& 
 
 namespace {
 
-constexpr size_t kBufferBytes = size_t{256} << 10;
-static_assert(kBufferBytes >= kMaxComponents * sizeof(double));
+constexpr size_t kStoredBytesAtOnce = size_t{256} << 10;
+static_assert(kStoredBytesAtOnce >= kMaxComponents * sizeof(double));
 
 /// Calls use(Stored{}) with the C++ type that `type` stands for.
 template <typename Use>
@@ -227,11 +227,12 @@ void readTuples(const VtkArray& array, uint64_t first, uint64_t count,
   CURVISPLAT_CHECK(first <= array.tuples && count <= array.tuples - first);
   static const PerThread<std::vector<std::byte>> buffers;
   std::vector<std::byte>& buffer = buffers.own();
-  buffer.resize(kBufferBytes);
+  buffer.resize(kStoredBytesAtOnce);
   const uint64_t tuple_bytes = array.tupleBytes();
   const bool swap = array.order != kMachineByteOrder;
   for (uint64_t done = 0; done < count;) {
-    const auto tuples = static_cast<size_t>(std::min<uint64_t>(count - done, kBufferBytes / tuple_bytes));
+    const auto tuples =
+        static_cast<size_t>(std::min<uint64_t>(count - done, kStoredBytesAtOnce / tuple_bytes));
     const auto bytes = std::span(buffer).first(static_cast<size_t>(tuples * tuple_bytes));
     array.bytes->readAt((first + done) * tuple_bytes, bytes);
     for (const WantedComponent<Value>& component : wanted)
@@ -252,7 +253,7 @@ void packNumbers(TextReader& text, const std::string& name, uint64_t count, VtkT
   withType(type, [&](auto stored) {
     using Stored = decltype(stored);
     std::vector<Stored> piece;
-    piece.reserve(kBufferBytes / sizeof(Stored));
+    piece.reserve(kStoredBytesAtOnce / sizeof(Stored));
     const auto add = [&](Stored number) {
       piece.push_back(number);
       if (piece.size() < piece.capacity()) return;

@@ -20,7 +20,7 @@ namespace curvisplat {
 namespace {
 
 constexpr const char* kRoot = "/VTKHDF";
-constexpr int kMaxDepth = 32;
+constexpr int kMaxGroupDepth = 32;
 constexpr uint64_t kMaxSteps = 10'000'000;
 
 /// Gathers the pieces of a file's data sets.
@@ -102,12 +102,12 @@ class HdfGatherer {
     const std::string assembly = fmt::format("{}/Assembly", kRoot);
     if (const auto self = file_.identity(assembly)) known.insert(*self);
     addMembers(assembly, "", known, 0);
-    addMembers(kRoot, "", known, kMaxDepth - 1);
+    addMembers(kRoot, "", known, kMaxGroupDepth - 1);
   }
 
   /// A group without a type holds further ones, or is an empty block.
   void addMembers(const std::string& group, const std::string& name, std::set<uint64_t>& known, int depth) {
-    if (depth == kMaxDepth) return;
+    if (depth == kMaxGroupDepth) return;
     for (const std::string& child : file_.names(group)) {
       const std::string place = group + "/" + child, own = name + (name.empty() ? "" : "/") + child;
       const auto identity = file_.identity(place);

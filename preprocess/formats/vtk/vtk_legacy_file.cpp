@@ -11,7 +11,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr std::pair<const char*, VtkType> kTypes[] = {
+constexpr std::pair<const char*, VtkType> kLegacyTypes[] = {
     {"char", VtkType::kInt8},
     {"signed_char", VtkType::kInt8},
     {"unsigned_char", VtkType::kUint8},
@@ -94,9 +94,9 @@ VtkArray VtkLegacyFile::readNumbers(const std::string& name, const std::string& 
   VtkArray array;
   array.name = name;
   const std::string type_word = lowerCase(type);
-  const auto* const known = std::find_if(std::begin(kTypes), std::end(kTypes),
+  const auto* const known = std::find_if(std::begin(kLegacyTypes), std::end(kLegacyTypes),
                                          [&](const auto& entry) { return type_word == entry.first; });
-  if (known == std::end(kTypes))
+  if (known == std::end(kLegacyTypes))
     fail("array {} has type {}; expected float, double or an integer", name, type);
   if (components == 0 || components > kMaxComponents)
     fail("array {} has {} components; expected 1 to {}", name, components, kMaxComponents);

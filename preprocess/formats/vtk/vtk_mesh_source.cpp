@@ -128,9 +128,9 @@ void appendVtkCell(uint8_t type, std::span<const uint64_t> points, bool older,
 
 // Bits of vtkGhostType (vtkDataSetAttributes). Another piece has a duplicate cell; a duplicate point may
 // well be one of a cell that no other piece has.
-constexpr int kHiddenPoint = 2;
+constexpr int kOmittedPoint = 2;
 constexpr int kDuplicateCell = 1;
-constexpr int kHiddenCell = kDuplicateCell | 8 | 32;  // refined, hidden
+constexpr int kOmittedCell = kDuplicateCell | 8 | 32;  // refined, hidden
 
 constexpr uint64_t kChunk = 65536;
 constexpr uint64_t kMaxPoints = uint64_t{1} << 24;  // of cells that are read together
@@ -144,8 +144,8 @@ std::vector<float> readAsFloats(const VtkArray& array, uint64_t first, uint64_t 
   return numbers;
 }
 
-void readFlags(const std::optional<VtkArray>& array, uint64_t first, uint64_t count, int bits,
-               std::vector<uint8_t>& out) {
+void readGhosts(const std::optional<VtkArray>& array, uint64_t first, uint64_t count, int bits,
+                std::vector<uint8_t>& out) {
   out.assign(count, 0);
   if (!array) return;
   const std::vector<float> flags = readAsFloats(*array, first, count);
@@ -155,7 +155,7 @@ void readFlags(const std::optional<VtkArray>& array, uint64_t first, uint64_t co
 /// The cells that vtkGhostType or vtkGhostLevels leaves out.
 void readHiddenCells(const VtkPiece& piece, uint64_t first, uint64_t count, int bits,
                      std::vector<uint8_t>& out) {
-  readFlags(piece.cell_ghosts, first, count, bits, out);
+  readGhosts(piece.cell_ghosts, first, count, bits, out);
   if (piece.cell_ghosts || !piece.cell_levels) return;
   const std::vector<float> levels = readAsFloats(*piece.cell_levels, first, count);
   for (size_t n = 0; n < count; ++n) out[n] = levels[n] > 0;
@@ -317,7 +317,7 @@ void VtkMeshSource::readPoints(uint32_t piece_number, uint64_t first, uint64_t c
   const std::array<WantedComponent<double>, 3> wanted{
       {{0, out.x.data()}, {1, out.y.data()}, {2, out.z.data()}}};
   readTuples<double>(std::get<VtkPoints>(piece.nodes), first, count, wanted);
-  readFlags(piece.point_ghosts, first, count, kHiddenPoint, out.hidden);
+  readGhosts(piece.point_ghosts, first, count, kOmittedPoint, out.hidden);
   readScalars(piece_number, first, count, scalars, out.scalars);
 }
 
@@ -379,7 +379,7 @@ void VtkMeshSource::readCells(uint32_t piece_number, uint64_t first, uint64_t co
       throw Error("{}: polyhedron {} has faces that do not add up; the file is damaged", piece.file,
                   first + n);
   }
-  readHiddenCells(mesh_.pieces[piece_number], first, count, kHiddenCell, out.hidden);
+  readHiddenCells(mesh_.pieces[piece_number], first, count, kOmittedCell, out.hidden);
   readScalars(piece_number, first, count, scalars, out.scalars);
 }
 

@@ -11,17 +11,17 @@
 namespace curvisplat {
 namespace {
 
-using Node = pugi::xml_node;
+using XmlElement = pugi::xml_node;
 
-constexpr uint64_t kChunk = 65536;
-constexpr uint64_t kMaxPoints = std::numeric_limits<uint32_t>::max();
+constexpr uint64_t kSurfaceTuplesAtOnce = 65536;
+constexpr uint64_t kMaxSurfacePoints = std::numeric_limits<uint32_t>::max();
 
 /// Passes on the tuples of an array, some at a time, so that no more memory is taken than there is data.
 template <typename Use>
 void forTuples(const VtkArray& array, uint32_t components, const Use& use) {
-  std::vector<std::vector<double>> values(components, std::vector<double>(kChunk));
-  for (uint64_t first = 0; first < array.tuples; first += kChunk) {
-    const uint64_t count = std::min(kChunk, array.tuples - first);
+  std::vector<std::vector<double>> values(components, std::vector<double>(kSurfaceTuplesAtOnce));
+  for (uint64_t first = 0; first < array.tuples; first += kSurfaceTuplesAtOnce) {
+    const uint64_t count = std::min(kSurfaceTuplesAtOnce, array.tuples - first);
     std::vector<WantedComponent<double>> wanted;
     for (uint32_t c = 0; c < components; ++c) wanted.push_back({static_cast<int>(c), values[c].data()});
     readTuples<double>(array, first, count, wanted);
@@ -32,7 +32,7 @@ void forTuples(const VtkArray& array, uint32_t components, const Use& use) {
 /// A piece of the file.
 class PieceReader {
  public:
-  PieceReader(const VtkXmlFile& file, const Node& piece, VtkSurface& out)
+  PieceReader(const VtkXmlFile& file, const XmlElement& piece, VtkSurface& out)
       : file_(file), piece_(piece), out_(out), first_(out.points.size()) {}
 
   void read() {
@@ -53,23 +53,23 @@ class PieceReader {
  private:
   uint64_t countOf(const char* attribute) const {
     const uint64_t count = piece_.attribute(attribute).as_ullong(0);
-    if (count > kMaxPoints) file_.fail(std::string(attribute) + " is too large");
+    if (count > kMaxSurfacePoints) file_.fail(std::string(attribute) + " is too large");
     return count;
   }
 
-  Node arrayNamed(const Node& cells, const std::string& name) const {
-    for (const Node& node : cells.children("DataArray"))
+  XmlElement arrayNamed(const XmlElement& cells, const std::string& name) const {
+    for (const XmlElement& node : cells.children("DataArray"))
       if (name == node.attribute("Name").value()) return node;
     file_.fail("its cells have no array '" + name + "'");
   }
 
   void readCells(const char* element, uint64_t cells, bool strips) {
     if (cells == 0) return;
-    const Node node = piece_.child(element);
+    const XmlElement node = piece_.child(element);
     std::vector<uint64_t> ends;
     forTuples(file_.array(arrayNamed(node, "offsets"), cells), 1, [&](const auto& values, size_t n) {
       const double end = values[0][n];
-      if (!(end >= (ends.empty() ? 0.0 : static_cast<double>(ends.back())) && end <= 8.0 * kMaxPoints))
+      if (!(end >= (ends.empty() ? 0.0 : static_cast<double>(ends.back())) && end <= 8.0 * kMaxSurfacePoints))
         file_.fail("the offsets of its cells do not increase");
       ends.push_back(static_cast<uint64_t>(end));
     });
@@ -100,7 +100,7 @@ class PieceReader {
   }
 
   const VtkXmlFile& file_;
-  const Node& piece_;
+  const XmlElement& piece_;
   VtkSurface& out_;
   const uint64_t first_;  // of the piece's points
 };
@@ -112,8 +112,8 @@ VtkSurface readVtkSurface(const std::filesystem::path& path) {
   if (file.type() != "PolyData")
     file.fail("is a VTK file of type " + file.type() + "; a surface is a .vtp file, of type PolyData");
   VtkSurface surface;
-  for (const Node& piece : file.content().children("Piece")) PieceReader(file, piece, surface).read();
-  if (surface.points.size() > kMaxPoints) file.fail("has too many points");
+  for (const XmlElement& piece : file.content().children("Piece")) PieceReader(file, piece, surface).read();
+  if (surface.points.size() > kMaxSurfacePoints) file.fail("has too many points");
   if (surface.triangles.empty()) file.fail("has no polygons");
   return surface;
 }

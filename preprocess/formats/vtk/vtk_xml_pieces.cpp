@@ -97,7 +97,7 @@ uint64_t countIn(const VtkXmlFile& file, const Node& piece, const char* attribut
   return static_cast<uint64_t>(count);
 }
 
-VtkCells cellsOf(const VtkXmlFile& file, const Node& piece, uint64_t count) {
+VtkCells cellArraysOf(const VtkXmlFile& file, const Node& piece, uint64_t count) {
   const auto named = [&](const char* name) {
     return piece.child("Cells").find_child_by_attribute("DataArray", "Name", name);
   };
@@ -154,7 +154,7 @@ VtkXmlMeshPieces readXmlMeshPieces(const VtkXmlFile& file, std::vector<std::stri
     addArrays(file, node.child("PointData"), {false, points}, piece, warnings);
     addArrays(file, node.child("CellData"), {true, cells}, piece, warnings);
     read.pieces.push_back(std::move(piece));
-    read.cells.push_back(cellsOf(file, node, cells));
+    read.cells.push_back(cellArraysOf(file, node, cells));
   }
   read.encoding = encodingOf(file);
   read.time = timeOf(file);

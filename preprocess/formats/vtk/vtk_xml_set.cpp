@@ -19,7 +19,7 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-using Node = pugi::xml_node;
+using SetElement = pugi::xml_node;
 
 constexpr size_t kMaxFiles = 100'000;
 
@@ -145,7 +145,7 @@ class Gatherer {
     if (left_out_files_++ == 0) left_out_ = fmt::format("{} is of type {}", file.name(), file.type());
   }
 
-  fs::path pathOf(const VtkXmlFile& file, const Node& node, const char* attribute) const {
+  fs::path pathOf(const VtkXmlFile& file, const SetElement& node, const char* attribute) const {
     const std::string named = node.attribute(attribute).value();
     if (named.empty()) file.fail(fmt::format("has a <{}> without {}", node.name(), attribute));
     const bool is_first = inside_.size() == 1;
@@ -208,7 +208,7 @@ class Gatherer {
   }
 
   void addParallelMesh(const VtkXmlFile& file, const std::string& name) {
-    for (const Node& node : file.content().children("Piece")) {
+    for (const SetElement& node : file.content().children("Piece")) {
       const VtkXmlFile piece_file(files_, pathOf(file, node, "Source"));
       if ("P" + piece_file.type() != file.type())
         piece_file.fail(fmt::format("is a {}, but belongs to a {}", piece_file.type(), file.type()));
@@ -220,7 +220,7 @@ class Gatherer {
   void addParallel(const VtkXmlFile& file, const std::string& name) {
     std::vector<VtkPiece> pieces;
     std::vector<std::string> names;
-    for (const Node& node : file.content().children("Piece")) {
+    for (const SetElement& node : file.content().children("Piece")) {
       const std::optional<VtkExtent> extent = file.extent(node, "Extent");
       if (!extent) continue;
       const VtkXmlFile piece_file(files_, pathOf(file, node, "Source"));
@@ -242,8 +242,8 @@ class Gatherer {
   }
 
   /// Adds the files below an element. Their blocks are named by the path of element names, or by the file.
-  void addMembers(const VtkXmlFile& file, const Node& element, const std::string& name) {
-    for (const Node& node : element.children()) {
+  void addMembers(const VtkXmlFile& file, const SetElement& element, const std::string& name) {
+    for (const SetElement& node : element.children()) {
       if (node.type() != pugi::node_element) continue;
       const std::string own = node.attribute("name").value();
       const std::string separator = name.empty() || own.empty() ? "" : "/";
@@ -261,16 +261,16 @@ class Gatherer {
   void addAmr(const VtkXmlFile& file, const std::string& name) {
     std::vector<AmrPatch> patches;
     std::vector<size_t> pieces;  // [patch]
-    std::map<size_t, Node> levels;
-    for (const Node& node : file.content().children("Block")) {
+    std::map<size_t, SetElement> levels;
+    for (const SetElement& node : file.content().children("Block")) {
       const size_t level = levelOf(file, node, "level");
       if (!levels.emplace(level, node).second) file.fail(fmt::format("has two levels {}", level));
     }
-    std::vector<std::pair<size_t, Node>> sets;
+    std::vector<std::pair<size_t, SetElement>> sets;
     for (const auto& [level, block] : levels)
-      for (const Node& node : block.children("DataSet")) sets.emplace_back(level, node);
+      for (const SetElement& node : block.children("DataSet")) sets.emplace_back(level, node);
     // Version 0.1 has no blocks; the levels are called groups.
-    for (const Node& node : file.content().children("DataSet"))
+    for (const SetElement& node : file.content().children("DataSet"))
       sets.emplace_back(levelOf(file, node, "group"), node);
     for (const auto& [level, node] : sets) {
       if (!node.attribute("file")) continue;
@@ -294,14 +294,14 @@ class Gatherer {
     for (size_t n = 0; n < patches.size(); ++n) grid_.pieces[pieces[n]].refined = refined[n];
   }
 
-  static size_t levelOf(const VtkXmlFile& file, const Node& node, const char* attribute) {
+  static size_t levelOf(const VtkXmlFile& file, const SetElement& node, const char* attribute) {
     const double level = file.numbers(node, attribute, 1)[0];
     if (!(level >= 0 && level < kMaxAmrLevels) || level != std::floor(level))
       file.fail(fmt::format("has a level {}; expected 0 to {}", level, kMaxAmrLevels - 1));
     return static_cast<size_t>(level);
   }
 
-  static VtkExtent boxOf(const VtkXmlFile& file, const Node& node) {
+  static VtkExtent boxOf(const VtkXmlFile& file, const SetElement& node) {
     const std::vector<double> numbers = file.numbers(node, "amr_box", 6);
     if (const auto box = extentWith(numbers)) return *box;
     file.fail(fmt::format("has an amr_box of {}", fmt::join(numbers, " ")));
@@ -309,9 +309,9 @@ class Gatherer {
 
   /// [level]: cells of the next level along a cell, from the levels' spacing or as version 1.0 states it.
   static std::vector<std::array<int64_t, 3>> ratiosOf(const VtkXmlFile& file,
-                                                      const std::map<size_t, Node>& levels) {
+                                                      const std::map<size_t, SetElement>& levels) {
     std::vector<std::array<int64_t, 3>> ratios(kMaxAmrLevels, {2, 2, 2});
-    for (const Node& node : file.content().children("RefinementRatio")) {  // of version 0.1
+    for (const SetElement& node : file.content().children("RefinementRatio")) {  // of version 0.1
       const size_t level = levelOf(file, node, "level");
       ratios[level] =
           refinementOf(file.name(), level, std::vector<double>(3, file.numbers(node, "refinement", 1)[0]));
@@ -332,17 +332,17 @@ class Gatherer {
     return ratios;
   }
 
-  static double timeOf(const VtkXmlFile& file, const Node& node) {
+  static double timeOf(const VtkXmlFile& file, const SetElement& node) {
     return node.attribute("timestep") ? file.numbers(node, "timestep", 1)[0] : 0;
   }
-  static std::string partOf(const Node& node) {
+  static std::string partOf(const SetElement& node) {
     std::string part;
     for (const char* const key : {"group", "part", "name"})
       part += fmt::format("{}\n", node.attribute(key).value());
     return part;
   }
 
-  void noteVersions(const VtkXmlFile& file, const Node& older, const Node& newer) {
+  void noteVersions(const VtkXmlFile& file, const SetElement& older, const SetElement& newer) {
     if (replaced_.empty())
       replaced_ =
           fmt::format("names several files with the same part at time {:g} ({}, {}); the last one is read",
@@ -350,20 +350,20 @@ class Gatherer {
   }
 
   /// Removes the file that the step has for the part of `node`, which is read in its place.
-  void replacePart(const VtkXmlFile& file, const Node& node, std::vector<Node>& of_step) {
-    for (const Node& older : of_step)
+  void replacePart(const VtkXmlFile& file, const SetElement& node, std::vector<SetElement>& of_step) {
+    for (const SetElement& older : of_step)
       if (partOf(older) == partOf(node)) noteVersions(file, older, node);
-    std::erase_if(of_step, [&](const Node& older) { return partOf(older) == partOf(node); });
+    std::erase_if(of_step, [&](const SetElement& older) { return partOf(older) == partOf(node); });
   }
 
   /// Files of one time that do not differ in their part are parts all the same, as many programs write them, unless
   /// they have the same points: then they are versions of one part, and the last one is read.
-  std::vector<Node> withoutVersions(const VtkXmlFile& file, const std::vector<Node>& nodes) {
+  std::vector<SetElement> withoutVersions(const VtkXmlFile& file, const std::vector<SetElement>& nodes) {
     std::map<std::string, size_t> files_of_part;
-    for (const Node& node : nodes) ++files_of_part[partOf(node)];
-    std::vector<Node> kept;
+    for (const SetElement& node : nodes) ++files_of_part[partOf(node)];
+    std::vector<SetElement> kept;
     std::map<std::pair<std::string, uint64_t>, size_t> places;  // in `kept`
-    for (const Node& node : nodes) {
+    for (const SetElement& node : nodes) {
       const std::string part = partOf(node);
       if (files_of_part[part] > 1) {
         const auto [place, is_new] = places.try_emplace({part, checksumOfPoints(file, node)}, kept.size());
@@ -378,7 +378,7 @@ class Gatherer {
     return kept;
   }
 
-  uint64_t checksumOfPoints(const VtkXmlFile& file, const Node& node) const {
+  uint64_t checksumOfPoints(const VtkXmlFile& file, const SetElement& node) const {
     OpenGridOptions options;
     options.grid = pathOf(file, node, "file");
     options.temporary_folder = temporary_folder_;
@@ -388,10 +388,10 @@ class Gatherer {
   void addTimeStep(const VtkXmlFile& file) {
     if (in_time_series_) file.fail("is a time series inside another time series");
     in_time_series_ = true;
-    std::map<double, std::vector<Node>> steps;
-    Node before;
-    for (const Node& node : file.content().children("DataSet")) {
-      std::vector<Node>& of_step = steps[timeOf(file, node)];
+    std::map<double, std::vector<SetElement>> steps;
+    SetElement before;
+    for (const SetElement& node : file.content().children("DataSet")) {
+      std::vector<SetElement>& of_step = steps[timeOf(file, node)];
       // A run that was restarted goes back in time, and names the same parts of a step again.
       if (before && timeOf(file, before) != timeOf(file, node)) replacePart(file, node, of_step);
       of_step.push_back(before = node);
@@ -399,9 +399,10 @@ class Gatherer {
     if (steps.empty()) file.fail("names no file");
     for (const auto& [time, nodes] : steps) grid_.times.push_back(time);
     grid_.time_step = chosenTimeStep(file.name(), grid_.times, time_step_);
-    const std::vector<Node> nodes = withoutVersions(file, std::next(steps.begin(), grid_.time_step)->second);
+    const std::vector<SetElement> nodes =
+        withoutVersions(file, std::next(steps.begin(), grid_.time_step)->second);
     if (!replaced_.empty()) grid_.warnings.push_back(fmt::format("{}: {}", file.name(), replaced_));
-    for (const Node& node : nodes) {
+    for (const SetElement& node : nodes) {
       const fs::path path = pathOf(file, node, "file");
       const std::string own = node.attribute("name").value();
       add(path, nodes.size() == 1 && own.empty() ? "" : own.empty() ? path.stem().string() : own);
