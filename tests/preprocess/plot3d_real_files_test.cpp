@@ -274,7 +274,8 @@ TEST_F(RealFiles, ForeignFilesAreNamed) {
 
 TEST_F(RealFiles, ASolutionIsRefusedAsAGrid) {
   const std::string error = errorOf("bluntfin/bluntfinq.bin");
-  expectSays(error, "fit no PLOT3D grid");
+  expectSays(error, "looks like a solution without its grid (a Q file of 1 block of 40x32x32");
+  expectSays(error, "choose its grid, too");
 }
 
 }  // namespace

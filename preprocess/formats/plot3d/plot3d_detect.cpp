@@ -311,6 +311,7 @@ class Detection {
 
   [[noreturn]] void failUnfit(std::vector<Plot3dMisfit> misfits,
                               const std::vector<Plot3dBlock>* grid_blocks) const {
+    if (!grid_blocks) refuseSolution();
     const std::string expected = kindsText(candidates_.kinds);
     const auto rank = [&](const Plot3dMisfit& misfit) {
       const bool of_grid = grid_blocks && sameDimensions(misfit.blocks, *grid_blocks);
@@ -325,6 +326,19 @@ class Detection {
                             curvisplat::describe(furthest->layout.kind), furthest->reason);
     }
     throw Error("{}: its {} bytes fit no PLOT3D {}: {}{}", path_, file_size_, expected, finding, hint());
+  }
+
+  /// Refuses a solution in place of a grid by name. Some files end with a few bytes of padding; more may be a truncated grid.
+  void refuseSolution() const {
+    constexpr uint64_t kMaxPadding = 1024;
+    Plot3dCandidates others = candidates_;
+    others.kinds = {Plot3dKind::kQ, Plot3dKind::kOverflow, Plot3dKind::kFunction};
+    others.force = {};
+    for (const Plot3dFit& fit : fitPlot3d(others).fits)
+      if (fit.trailing_bytes <= kMaxPadding && !fit.layout.two_dimensional)
+        throw Error("{}: looks like a solution without its grid (a {} of {}, {}); choose its grid, too",
+                    path_, curvisplat::describe(fit.layout.kind), curvisplat::describe(fit.blocks),
+                    curvisplat::describe(fit.layout));
   }
 
   /// Describes only the properties that are decided before sizes are compared.

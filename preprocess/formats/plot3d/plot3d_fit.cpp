@@ -159,10 +159,9 @@ void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payloa
                        });
   throw LayoutMisfit{
       near ? LayoutMisfit::kDimensions : LayoutMisfit::kFirstRecord,
-      fmt::format("{}: found {} {}; expected {}{}", curvisplat::describe(header.blocks),
-                  payload.size() / unit, unit == 1 ? "bytes" : "numbers",
-                  expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }),
-                  cut_off ? "; the file seems to be truncated" : "")};
+      fmt::format("{}{}: found {} {}; expected {}", cut_off ? "the file seems to be truncated: " : "",
+                  curvisplat::describe(header.blocks), payload.size() / unit, unit == 1 ? "bytes" : "numbers",
+                  expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }))};
 }
 
 void fitHeader(const Plot3dCandidates& candidates, const Plot3dLayout& base, Plot3dFits& found) {

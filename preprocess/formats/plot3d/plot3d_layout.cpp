@@ -228,7 +228,9 @@ uint64_t checkedNodes(const Plot3dLayout& layout, const int64_t* dimensions, uin
   if (!possible || nodes > limit)
     throw LayoutMisfit{
         LayoutMisfit::kFirstRecord,
-        fmt::format("block {} of {} nodes does not fit into it; the file may be truncated", b + 1, words)};
+        possible ? fmt::format("block {} of {} nodes does not fit into it; the file may be truncated", b + 1,
+                               words)
+                 : fmt::format("dimensions of {} are impossible; it may be of another kind", words)};
   return nodes;
 }
 
