@@ -241,6 +241,8 @@ TEST_F(WindowPlayback, RangesAreOfTheSeriesOrOfTheStep) {
   click("range of this step");
   moveTo(rest_);
   saveAndCopy();
+  tab("Time");
+  placeOf("range of step 4: 0 to 5");
   const auto commands = close();
   ASSERT_EQ(commands.size(), 4u);
   EXPECT_EQ(valueOf(commands[1], "--range"), "0,5");

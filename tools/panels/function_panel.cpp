@@ -377,13 +377,18 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
     const StepValues& of = steps[step].values[variable];
     if (ImGui::Button("This step")) set(of.min, of.max);
     nameWidget("range of this step");
-    hint("from the lowest to the highest value of this time step");
+    hint(fmt::format("from the lowest to the highest value of this time step: {:.6g} to {:.6g}\n"
+                     "(of all steps: the tab Time)",
+                     of.min, of.max)
+             .c_str());
   }
   // The tick says which of the others it is.
   if (function.asinhScale()) {
     ImGui::SameLine();
-    ImGui::TextUnformatted("asinh scale");
-    hint("chosen from the data: linear around their middle, logarithmic further out");
+    ImGui::TextUnformatted("scale: asinh");
+    hint(
+        "Chosen from the data: linear around their middle, logarithmic further out.\n"
+        "Ramp makes it linear, log scale logarithmic.");
   }
   nameWidget(fmt::format("scale {}", function.asinhScale() ? "asinh"
                                      : function.logScale() ? "logarithmic"

@@ -92,7 +92,7 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   if (shown == 0) drawColour(state, facts, actions);
   if (shown == 1) drawObjects(state, facts, actions);
   if (shown == 2) drawView(state, actions, facts);
-  if (shown == 3) drawTime(actions, *facts.playback);
+  if (shown == 3) drawTime(state, actions, *facts.playback);
   ImGui::EndChild();
   actions.changed |= actions.function_changed;
   drawFooter(actions);
@@ -109,8 +109,8 @@ bool Panels::hasMoreObjects(const ViewState& state) {
 
 void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions& actions) {
   bool draws_volume = state.drawsVolume();
-  ImGui::BeginDisabled(!state.hasSheets());  // there would be nothing to see
-  if (eye(draws_volume, "volume")) {
+  // Without anything else there would be nothing to see. The eye is not greyed then, which would read as hidden.
+  if (eye(draws_volume, "volume") && state.hasSheets()) {
     state.volume = draws_volume;
     actions.changed = true;
   }
@@ -124,7 +124,6 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
   ImGui::TextUnformatted("volume");
   nameWithoutTab("volume");
   explain();
-  ImGui::EndDisabled();
   ImGui::SameLine(0.5f * ImGui::GetContentRegionMax().x);
   commandOption(Command::kPlaneFrames, actions, "frames of cuts", facts.shows_frames);
   surfaces_.draw(state, facts.faces ? *facts.faces : std::vector<std::string>{}, facts.further, actions);
@@ -135,7 +134,29 @@ void Panels::drawObjects(ViewState& state, const PanelFacts& facts, PanelActions
     drawMarkers(state, cache_.manifest().globe, actions);
 }
 
-void Panels::drawTime(PanelActions& actions, Playback& playback) {
+namespace {
+
+/// Draws a line for each step: the lowest and the highest value of the scalar.
+void drawRanges(const CacheReader& cache, const std::string& scalar) {
+  const size_t variable = cache.variableNamed(scalar);
+  const std::vector<SeriesStep>& steps = cache.series().steps;
+  heading(fmt::format("Range of {}", scalar).c_str());
+  ImGui::BeginChild("ranges");
+  ImGuiListClipper lines;
+  lines.Begin(static_cast<int>(steps.size()));
+  while (lines.Step())
+    for (auto n = static_cast<size_t>(lines.DisplayStart); n < static_cast<size_t>(lines.DisplayEnd); ++n) {
+      const StepValues& of = steps[n].values[variable];
+      const std::string text = fmt::format("step {}: {:.6g} to {:.6g}", n + 1, of.min, of.max);
+      ImGui::TextUnformatted(text.c_str());
+      nameWithoutTab("range of " + text);
+    }
+  ImGui::EndChild();
+}
+
+}  // namespace
+
+void Panels::drawTime(const ViewState& state, PanelActions& actions, Playback& playback) {
   label("steps per second");
   float speed = static_cast<float>(playback.stepsPerSecond());
   if (slider("##steps per second", speed, 1, 60, "%.0f", ImGuiSliderFlags_AlwaysClamp))
@@ -149,6 +170,7 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   if (option("interpolate between steps", interpolates)) actions.interpolates = interpolates;
   ImGui::Spacing();
   commandButton(Command::kSaveStepsMovie, actions, "Save film of all steps...");
+  drawRanges(cache_, state.variable);
 }
 
 namespace {
@@ -311,13 +333,17 @@ void drawSurroundings(ViewState& state, PanelActions& actions) {
   // Not "light" beside "dark", which reads as a choice of two.
   actions.changed |= ImGui::Checkbox("lighting", &state.lit);
   nameWidget("light");
-  hint("shapes stand out; colours are darker than the scalar bar's");
+  hint(
+      "Shapes stand out; colours are darker than the scalar bar's.\n"
+      "On: volume and surfaces have the light that is set below. Off: surfaces alone are lit, from the "
+      "viewer.");
   ImGui::SameLine(column);
   if (ImGui::Checkbox("dark background", &state.dark)) {
     state.suitBackground();
     actions.changed = actions.function_changed = true;
   }
   nameWidget("dark");
+  hint("off: a white background (B)");
   actions.changed |= option("scalar bar", state.annotations.scalar_bar);
   ImGui::SameLine(column);
   actions.changed |= option("outline", state.annotations.outline);
@@ -378,6 +404,7 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
       {Command::kLookMinusY, "-y"},    {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
       {Command::kLookIsometric, "Iso"}};
   label("look from");
+  hint("+x: from the end of the x axis, towards -x; the other keys are alike");
   for (const auto& [command, text] : kSides) {
     commandButton(command, actions, text);
     if (command != Command::kLookIsometric) ImGui::SameLine();

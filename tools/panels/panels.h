@@ -74,7 +74,7 @@ class Panels {
   bool hasMoreObjects(const ViewState& state);
   void drawColour(ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawObjects(ViewState& state, const PanelFacts& facts, PanelActions& actions);
-  void drawTime(PanelActions& actions, Playback& playback);
+  void drawTime(const ViewState& state, PanelActions& actions, Playback& playback);
   void drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawOpacityScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions);
   void drawFunctions(ViewState& state, PanelActions& actions, uint64_t step);
