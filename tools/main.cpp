@@ -115,6 +115,8 @@ std::string unknownOption(const CLI::App& command, const std::string& name) {
   for (const auto& [foreign, ours] : kForeignOptions)
     if (name == foreign && std::find(names.begin(), names.end(), ours) != names.end())
       return fmt::format("unknown option {} (did you mean {}?)", name, ours);
+  if (command.get_name() == "view" && (name == "--scale" || name == "--font-size"))
+    return fmt::format("unknown option {}: Ctrl and + make the window's texts larger, which is kept", name);
   return fmt::format("unknown option {}{}", name, didYouMean(name, names));
 }
 

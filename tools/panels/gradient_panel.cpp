@@ -73,7 +73,9 @@ GradientPanel::Result GradientPanel::draw(std::vector<OpacityPoint>& points, siz
   bool on = !points.empty();
   result.changed = ImGui::Checkbox("opacity by gradient", &on);
   nameWidget("gradient opacity");
-  hint("hides where the scalar hardly changes");
+  hint(
+      "Hides where the scalar hardly changes. Boundary layers stay, which are steepest:\n"
+      "for a shock alone choose the magnitude of a gradient at \"opacity by\".");
   if (result.changed && on) points = rampBetween(0.5, 0.8);
   if (!on) points.clear();
   if (points.empty()) return result;
@@ -84,9 +86,9 @@ GradientPanel::Result GradientPanel::draw(std::vector<OpacityPoint>& points, siz
     if (point.opacity <= points.front().opacity) from = static_cast<float>(point.x);
   for (size_t n = points.size(); n-- > 0;)
     if (points[n].opacity >= points.back().opacity) to = static_cast<float>(points[n].x);
-  label("volume less steep");
+  label("flattest part");
   from *= 100, to *= 100;
-  if (dragEnds("##gradient", from, to, {0.3f, 0, 100, "hidden: %.0f %%", "whole: %.0f %%"})) {
+  if (dragEnds("##gradient", from, to, {0.3f, 0, 100, "hidden: %.0f %%", "faint: to %.0f %%"})) {
     const auto share = [](float percent) { return std::clamp(static_cast<double>(percent) / 100, 0.0, 1.0); };
     points = rampBetween(share(from), share(std::max(from, to)));
     result.changed = true;
@@ -94,9 +96,9 @@ GradientPanel::Result GradientPanel::draw(std::vector<OpacityPoint>& points, siz
   result.dragging = isDragged();
   nameWidget("gradient shares");
   hint(
-      "What is less steep than the first part of the volume is hidden, what is steeper than the second is "
-      "whole;\n"
-      "drag to change, Ctrl + click to type a number.");
+      "Shares of the volume, beginning where the scalar changes least: up to the first it is hidden,\n"
+      "up to the second fainter, and beyond as opaque as the curve above says.\n"
+      "Drag to change, Ctrl + click to type a number.");
   return result;
 }
 

@@ -152,14 +152,16 @@ void hint(const char* text) {
   // Beside the widget and not on it, nor on its neighbours in the line.
   const ImGuiStyle& style = ImGui::GetStyle();
   const ImVec2 text_size = ImGui::CalcTextSize(text), screen = ImGui::GetIO().DisplaySize;
-  const float width = text_size.x + 2 * style.WindowPadding.x,
-              height = text_size.y + 2 * style.WindowPadding.y;
+  const ImVec2 padding(std::max(style.WindowPadding.x, 0.5f * ImGui::GetFontSize()),
+                       std::max(style.WindowPadding.y, 0.3f * ImGui::GetFontSize()));  // a bar has less of it
+  const float width = text_size.x + 2 * padding.x, height = text_size.y + 2 * padding.y;
   const float below = to.y + style.ItemSpacing.y;
   ImGui::SetNextWindowPos({std::max(0.0f, std::min(from.x, screen.x - width)),
                            below + height > screen.y ? from.y - style.ItemSpacing.y - height : below});
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, padding);
   ImGui::PushStyleVar(ImGuiStyleVar_Alpha, 1);  // of a disabled widget, too
   ImGui::SetTooltip("%s", text);
-  ImGui::PopStyleVar();
+  ImGui::PopStyleVar(2);
   nameWidget(std::string("hint ") + text);
 }
 

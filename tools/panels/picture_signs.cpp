@@ -176,7 +176,7 @@ bool PlaneHandles::drawTip(ClipPlane& plane, size_t number, const glm::dvec3& mi
   const glm::dvec2 handle = *scene.place(middle);
   glm::dvec2 along = lever * glm::dvec2(tip.x, -tip.y);
   // Where the normal points at the viewer or away, the grip lies beside the other one.
-  const double nearest = 2.5 * size, length = glm::length(along);
+  const double nearest = std::max(2.5 * size, 0.6 * lever), length = glm::length(along);
   if (length < nearest) along = length > 0.1 ? nearest / length * along : glm::dvec2(0, -nearest);
   const bool is_dragged = dragged_ && dragged_->number == number && dragged_->turns;
   const ImU32 colour = is_dragged ? kDragged : kColour;

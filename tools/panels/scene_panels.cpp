@@ -75,9 +75,9 @@ void opacitySlider(const char* text, const std::string& name, double& opacity, P
 
 /// Draws a checkbox that multiplies an opacity by the volume's. `name`: of the widget. Returns whether it changed.
 bool opacityByFunction(bool& by_function, const std::string& name) {
-  const bool changed = ImGui::Checkbox("times the volume's opacity", &by_function);
+  const bool changed = ImGui::Checkbox("transparent where the volume is", &by_function);
   nameWidget(name);
-  hint("more transparent where the opacity curve is low");
+  hint("multiplies the opacity by that of the curve in Colour, at the value of each place");
   return changed;
 }
 
@@ -308,6 +308,10 @@ void SurfacePanel::drawSurfaces(ViewState& state, const std::vector<std::string>
   commandButton(Command::kAddSurfaceFile, actions, "Add from a file...");
   ImGui::EndDisabled();
   hint("STL, PLY or OBJ");
+  if (!state.lit && !(state.surfaces.empty() && state.faces.empty())) {
+    ImGui::TextDisabled("lit from the viewer; direction: View > lighting");
+    nameWithoutTab("where the light is");
+  }
   drawColouring(state, further, actions);
 
   size_t removed = state.faces.size();

@@ -35,7 +35,7 @@ bool drawRecent(const std::vector<std::string>& files, size_t number) {
     names += (names.empty() ? "" : "  ") + std::filesystem::path(file).filename().string();
   const bool chosen = ImGui::Selectable(fmt::format("{}##{}", names, number).c_str());
   nameWidget(fmt::format("recent {}", number + 1));
-  const std::string folder = std::filesystem::path(files.front()).parent_path().string();
+  const std::string folder = std::filesystem::path(files.front()).lexically_normal().parent_path().string();
   if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", files.front().c_str());
   const float wide = ImGui::CalcTextSize(folder.c_str()).x, right = ImGui::GetContentRegionMax().x;
   const float own = ImGui::CalcTextSize(names.c_str()).x + 2 * ImGui::GetFontSize();
