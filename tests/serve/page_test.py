@@ -398,7 +398,7 @@ def editing(tab):
     changes(tab, lambda: tab.run("document.querySelector('#clip_planes button:last-of-type').click()"), "removing the plane")
     changes(tab, lambda: (tab.click("#add-slice"), press(tab, "#volume")), "a slice", "slice")
     changes(tab, lambda: press(tab, "#slices .eye"), "the slice's eye")
-    expect(tab.run("document.getElementById('volume').disabled"), "the volume cannot be hidden where nothing else is drawn")
+    expect(tab.run("document.getElementById('volume').getAttribute('aria-disabled')") == "true", "the volume cannot be hidden where nothing else is drawn")
     press(tab, "#slices .eye")
     press(tab, "#volume")
     press(tab, "#slices button:last-of-type")
@@ -448,6 +448,7 @@ def saves_pictures(tab):
     tab.run("createImageBitmap(window.saves[1][1]).then(b => { window.saved = [b.width, b.height]; })")
     expect(tab.wait("window.saved", "its size") == [1920, 1080], f"it has the size that was chosen: {tab.run('window.saved')}")
     expect(tab.run("document.getElementById('status').textContent") == "saved annulus.png, 1920 x 1080 pixels", "its size is said")
+    expect(tab.run("document.getElementById('status').className") == "", "it is news, not an error")
     expect(rest(tab) == before, "the view is as it was")
     set_value(tab, "#save-size", "")
     tab.run("document.getElementById('save').click()")
@@ -463,6 +464,27 @@ def saves_pictures(tab):
     found = tab.wait("window.pixels", "both pictures' pixels")
     expect(100 < found < 0.1 * 4 * size[0] * size[1], f"a dot and a text were added: {found} channels differ")
     tab.run("state.markers.length = 0; showMarkers()")
+
+
+def saves_what_it_says(browser, caches):
+    """A picture that does not fit into the viewer's memory: the file comes, its size is said, and why, each time."""
+    with serving(program, caches[:1], "--viewer-memory", "96M", "--memory", "96M", "--backend", "cpu") as server:
+        tab = opened(browser, server.url)
+        tab.run("window.saves = []; download = (blob, name) => window.saves.push([name, blob])")
+        set_value(tab, "#save-size", "1920x1080")
+        for n in (1, 2):
+            rest(tab)
+            press(tab, "#save")
+            tab.wait(f"window.saves.length === {n}", "the picture")
+            tab.run(f"window.saved = null; createImageBitmap(window.saves[{n - 1}][1]).then(b => {{ window.saved = [b.width, b.height]; }})")
+            width, height = tab.wait("window.saved", "its size")
+            said = tab.run("document.getElementById('status').textContent")
+            expect((width, height) == (960, 540), f"the file has fewer pixels: {width} x {height}")
+            expect(said.startswith(f"saved annulus.png, {width} x {height} pixels; --viewer-memory 96 MiB: too little for 1920x1080 pixels"),
+                   f"the size of the file and the reason are said: {said}")
+            shot(tab, "saved_fewer")
+        expect(tab.run("document.getElementById('status').className") == "wrong", "it is shown as an error")
+        tab.call("Page.navigate", url="about:blank")
 
 
 def sizes(tab):
@@ -766,7 +788,12 @@ def two_scalars(tab):
     changes(tab, lambda: set_value(tab, "#opacity_by", names[1]), "another scalar's opacities", "two_scalars")
     expect(tab.run(f"{PAGE}.state.opacity_by.variable") == names[1], "the opacities are the other scalar's")
     own = tab.run(f"{PAGE}.state.function.Points")
-    set_value(tab, "#edits", "opacities")
+    shown = "[document.getElementById('edits').value, document.getElementById('opacities-row').hidden]"
+    expect(tab.run(shown) == ["opacities", False], f"the opacities that have an effect are edited: {tab.run(shown)}")
+    tab.run("$('edits').value = 'colours'; $('edits').onchange()")
+    expect(tab.run(shown) == ["colours", True], "no opacities are edited that have no effect")
+    tab.run("openNamed(cache.name)")  # as after a reload
+    tab.wait("$('edits').value === 'opacities'", "the opacities again")
     changes(tab, lambda: set_value(tab, "#unit", "0.05"), "the other function's opacity unit")
     expect(tab.run(f"{PAGE}.state.opacity_by.function.ScalarOpacityUnitDistance") == 0.05, "the other function is edited")
     expect(tab.run(f"{PAGE}.state.function.Points") == own, "the colours' function is as it was")
@@ -827,6 +854,30 @@ def reversed_floats(data):
     return b"".join(data[n:n + 4] for n in range(len(data) - 4, -4, -4))
 
 
+def swipes(tab):
+    """A finger that swipes over the curve scrolls, and one that taps adds a point, which a button undoes."""
+    tab.run("setPoints([[0, 0], [1, 0.04]].map(([u, opacity]) => ({ u, opacity, midpoint: 0.5, sharpness: 0 }))); changed()")
+    rest(tab)
+    tab.run("document.getElementById('curve').scrollIntoView({ block: 'center' })")
+    x, y = tab.place("#curve")
+    scrolled = "document.getElementById('panel').scrollTop"
+    before, points = tab.run(scrolled), tab.run("state.function.Points")
+    tab.touch("touchStart", (x, y - 30))
+    for n in range(1, 9):
+        tab.touch("touchMove", (x, y - 30 - 12 * n))
+    tab.touch("touchEnd")
+    expect(tab.run("state.function.Points") == points, "a swipe over the curve adds no point")
+    wait_for(lambda: tab.run(scrolled) > before, "a swipe over the curve to scroll the panel", 20)
+    tab.run("document.getElementById('curve').scrollIntoView({ block: 'center' })")
+    x, y = tab.place("#curve")
+    tab.touch("touchStart", (x, y - 30))
+    tab.touch("touchEnd")
+    wait_for(lambda: tab.run("points().length") == 3, "a tap to add a point", 20)
+    rest(tab)
+    tab.run("document.getElementById('undo').click()")
+    expect(tab.run("points().length") == 2, "a button undoes it")
+
+
 def phone(browser, server):
     """On a phone nothing is wider than the page, and a finger finds what it is to press."""
     wide = opened(browser, server.url)
@@ -856,6 +907,7 @@ def phone(browser, server):
     expect(tab.run("document.getElementById('keys').scrollTop") == 0, "the list begins at its top")
     shot(tab, "phone_keys")
     tab.run("document.getElementById('keys').close()")
+    swipes(tab)
     # Its whole label switches a box.
     before = tab.run("document.getElementById('outline').checked")
     tab.run("document.getElementById('outline').closest('label').click()")
@@ -996,6 +1048,7 @@ with tempfile.TemporaryDirectory() as folder:
         print("lost connection done")
         as_many_clients_as_may_be(browser, caches)
         thumbnails(browser, caches)
+        saves_what_it_says(browser, caches)
         print("thumbnails done")
         page_without_server(browser, folder)
         print("page without a server done")

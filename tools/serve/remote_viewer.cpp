@@ -280,11 +280,7 @@ class RemoteViewer::Work {
   }
 
   void send(const Asked& asked, ShownFrame frame) {
-    if (asked.reduction > 1 && reduction_said_ != std::pair(asked.view.size, asked.reduction)) {
-      reduction_said_ = {asked.view.size, asked.reduction};
-      report(UsageError("{}; the picture has 1/{} of them each way", tooLittle(asked.view.size),
-                        asked.reduction));
-    }
+    sayIfReduced(asked, frame.is_final);
     const Manifest& manifest = caches_.reader(cache_).manifest();
     const ShownFunctions functions(asked.state, manifest);
     const AnnotatedScene scene = sceneOf(asked.state, functions, frame, asked.picture,
@@ -306,6 +302,16 @@ class RemoteViewer::Work {
         header.is_png ? losslessMessage(header, picture) : jpegMessage(header, picture, line_.quality());
     line_.sent(header.picture, secondsNow(), !header.is_png, message.size());
     viewer_.send_(std::move(message), false);
+  }
+
+  /// Reports that a picture has fewer pixels: of a view once, of each picture that is saved right before it.
+  void sayIfReduced(const Asked& asked, bool is_final) {
+    const std::pair said(asked.view.size, asked.reduction);
+    if (asked.reduction == 1 || (asked.view.saves ? !is_final : reduction_said_ == said)) return;
+    if (!asked.view.saves) reduction_said_ = said;
+    const std::string text =
+        fmt::format("{}; the picture has 1/{} of them each way", tooLittle(asked.view.size), asked.reduction);
+    viewer_.send_(caches_.reducedText(text), true);
   }
 
   RemoteViewer& viewer_;

@@ -299,6 +299,10 @@ std::string ServedCaches::refusalText(const std::string& text) {
   return textOf({{"type", "error"}, {"text", text}});
 }
 
+std::string ServedCaches::reducedText(const std::string& text) {
+  return textOf({{"type", "error"}, {"text", text}, {"reduced", true}});
+}
+
 std::string ServedCaches::errorText(std::string text) const {
   const auto replaceAll = [&](const std::string& from, const std::string& to) {
     for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))

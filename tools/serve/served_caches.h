@@ -79,6 +79,8 @@ class ServedCaches {
   std::string errorText(std::string text) const;
   /// An error for a page, of a text that has no paths.
   static std::string refusalText(const std::string& text);
+  /// The error that a picture has fewer pixels than were asked for; a page that saves the picture waits for it still.
+  static std::string reducedText(const std::string& text);
 
  private:
   const ServedCache& at(size_t cache) const;
