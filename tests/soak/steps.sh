@@ -5,11 +5,11 @@
 #
 #   tests/soak/steps.sh [--short | --full] [PROGRAM [FOLDER]]
 #
-# In full: 1,000 steps. In short: 24.
+# In full: 1,000 steps. In short: 12.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-if [ $form = full ]; then steps=1000 size=64x48x24 memories="256M 56M" interval_s=0.25; else steps=24 size=40x32x16 memories="64M 56M" interval_s=0.05; fi
+if [ $form = full ]; then steps=1000 size=64x48x24 memories="256M 56M" interval_s=0.25; else steps=12 size=40x32x16 memories="64M 56M" interval_s=0.05; fi
 quietly "$program" generate wake --size "$size" --steps "$steps" -o "$folder/w"
 quietly "$program" convert "$folder/w.xyz" "$folder/w_*.fun" -o "$folder/w.splats"
 rm "$folder"/w*.fun
