@@ -29,8 +29,8 @@ class MeshDisk(FormatCase):
 
     def test_estimates_are_right(self):
         turn = 0
-        for options in (["--size", "56"], ["--size", "56", "--shuffled"], ["--size", "36", "--tetrahedra"],
-                        ["--size", "30", "--tetrahedra", "--shuffled"]):
+        for options in (["--size", "42"], ["--size", "42", "--shuffled"], ["--size", "28", "--tetrahedra"],
+                        ["--size", "24", "--tetrahedra", "--shuffled"]):
             path = self.mesh(*options)
             turn += 1
             for scalar in some_of("fc", 2, turn=turn):
