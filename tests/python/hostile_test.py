@@ -220,7 +220,7 @@ class HostileTest(unittest.TestCase):
 
     def test_ctrl_c_in_any_pass_leaves_nothing(self):
         self.attempt("""
-            arrays = grid(128)
+            arrays = grid(96)
             stopped = []
             for phase in ("scan", "count", "scatter", "seams", "build", "faces"):
                 def report(now, *state):
