@@ -88,7 +88,7 @@ TEST_F(ConversionSweep, ALargerOneIsWholeOrNothing) {
   writeFiles(output_, both_);
   ASSERT_GT(CacheReader(output_).manifest().levels, 1u);
   faults::FaultSweep conversion = converting({}), addition = adding();
-  conversion.stride = addition.stride = 223;
+  conversion.stride = addition.stride = 463;
   EXPECT_GE(conversion.run(faults::kFailsOnce), 13);
   ASSERT_FALSE(HasFailure());
   EXPECT_GE(addition.run(faults::kFailsOnce), 12);
