@@ -44,9 +44,9 @@ class Frames : public ProgramSuite<Frames> {
 
   static std::string cache(const std::string& name = "small") { return file(name + ".splats"); }
 
-  /// A cache of a million nodes; made by the first who asks.
+  /// A cache of 246,000 nodes, in several bricks; made by the first who asks.
   static std::string large() {
-    if (!fs::exists(cache("large"))) madeCache(file("large"), "half-annulus", "160x80x80");
+    if (!fs::exists(cache("large"))) madeCache(file("large"), "half-annulus", "96x64x40");
     return cache("large");
   }
 
@@ -322,9 +322,9 @@ TEST_F(Frames, MaxSplatsHolds) {
               "64x64"} +
         more);
   };
-  draw(large(), "few.exr", {"--max-splats", "123456"});
-  EXPECT_LE(json("splats.json")["frames"][0]["splats_read"], 123456);
-  EXPECT_EQ(json("splats.json")["max_splats"], 123456);
+  draw(large(), "few.exr", {"--max-splats", "98765"});
+  EXPECT_LE(json("splats.json")["frames"][0]["splats_read"], 98765);
+  EXPECT_EQ(json("splats.json")["max_splats"], 98765);
   // More than there are change nothing.
   draw(cache(), "many.exr", {"--max-splats", "9M"});
   draw(cache(), "free.exr", {});
@@ -345,7 +345,7 @@ TEST_F(Frames, AFirstImageIsWrittenEarlierAndLooksLikeTheFinalOne) {
   fmt::print("first image: {:.1f} dB, {} of {} splats\n", psnr_db, first["splats_read"].get<uint64_t>(),
              final["splats_read"].get<uint64_t>());
   EXPECT_GE(psnr_db, 25);
-  EXPECT_GT(final["splats_read"], 500'000);
+  EXPECT_GT(final["splats_read"], 150'000);
   EXPECT_LE(first["splats_read"], 100'000);
   EXPECT_LE(first["bytes_read"], 4 << 20);
   EXPECT_GT(stats["time_to_first_image_s"], 0);
