@@ -146,8 +146,10 @@ TEST_F(CardBricksTest, DrawSplatsAtBordersInTheSamePieces) {
     const uint64_t all = compare(name, camera("iso"), nothing);
     EXPECT_GT(all, 10'000u);
     EXPECT_EQ(compare(name, camera("iso", Projection::kPerspective), nothing), all);
-    compare(name, camera("-x"), [](FrameOptions& o) { o.classification = Classification::kFlat; });
-    compare(name, camera("+y"), [](FrameOptions& o) { o.scale = {1, 2, 0.5}; });
+    if (!cells || faults::isWholeSweep()) {
+      compare(name, camera("-x"), [](FrameOptions& o) { o.classification = Classification::kFlat; });
+      compare(name, camera("+y"), [](FrameOptions& o) { o.scale = {1, 2, 0.5}; });
+    }
     const auto light = [](FrameOptions& o) { o.light = Light{0.2f, 0.8f, 0.4f, glm::dvec3(1, 0.4, 0.6)}; };
     compare(name, camera("iso", Projection::kPerspective), light);
     compare(name, camera("iso"), [](FrameOptions& o) { o.lod_pixels = 4; });
@@ -281,6 +283,7 @@ TEST_F(CardBricksTest, GiveTheSameBitsForAnyHistoryThreadsAndMemory) {
     EXPECT_GT(stored, 0u);
     EXPECT_EQ(stored == statistics.splats_read, card_memory > 2 * kMiB);
     for (const unsigned threads : {1u, 3u}) {
+      if ((threads == 1) != (card_memory > 2 * kMiB) && !faults::isWholeSweep()) continue;
       const auto fresh = rendererBy(Backend::kEgl);
       FrameOptions wanted = options(card_memory);
       wanted.threads = threads;
@@ -443,14 +446,15 @@ TEST_F(FailingCard, ProjectsInSlabsWhatItsBuffersDoNotHoldAtOnce) {
   open("lattice.splats");
   FrameOptions large = options(64 * kMiB);
   large.size = {210, 175};  // the depths in which tiles of 4 pixels may order splats are small
-  for (const char* view : {"iso", "+z"}) {
+  for (const std::string view : {"iso", "+z"}) {
+    if (view == "+z" && !faults::isWholeSweep()) continue;  // as the test of its memory
     FrameStatistics whole, slabs;
-    const Image wanted = renderer()->render(camera(view), large, whole);
+    const Image wanted = renderer()->render(camera(view.c_str()), large, whole);
     EXPECT_EQ(whole.card_splats, whole.splats_read);
     EXPECT_EQ(whole.card_slabs, 1u);
     bool is_divided = false;
     for (const uint64_t buffer_bytes : {31 * kMiB / 8, 15 * kMiB / 4}) {
-      const Image image = renderer(buffer_bytes)->render(camera(view), large, slabs);
+      const Image image = renderer(buffer_bytes)->render(camera(view.c_str()), large, slabs);
       EXPECT_EQ(slabs.splats_drawn, whole.splats_drawn) << buffer_bytes;
       EXPECT_EQ(slabs.splats_off_screen, whole.splats_off_screen) << buffer_bytes;
       if (slabs.card_splats == whole.card_splats)
