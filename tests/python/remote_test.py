@@ -86,7 +86,7 @@ class Remote(unittest.TestCase):
 
         run("generate", "half-annulus", "--size", "96x64x64", "-o", "grid")
         run("convert", "grid.xyz", "grid.fun", "-o", "grid.splats")
-        run("generate", "half-annulus", "--size", "160x96x96", "-o", "big")
+        run("generate", "half-annulus", "--size", "112x80x64", "-o", "big")
         run("convert", "big.xyz", "big.fun", "-o", "big.splats")
         run("generate", "wake", "--size", "24x16x8", "--steps", "3", "--moving", "-o", "wake")
         run("convert", "wake_*.xyz", "wake_*.fun", "-o", "wake.splats")
