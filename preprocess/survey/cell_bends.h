@@ -20,6 +20,8 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,6 +34,8 @@ namespace curvisplat {
 /// Means of the squares of T over the nodes of a block, by volume and weighted.
 struct BlockBends {
   double volume = 0;
+  double shortest = 0;  // the mean of the shortest edge of a cell, by volume
+  glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-lower};  // the box of the nodes
   /// [component][pair of axes: ii, jj, kk, jk, ki, ij]
   std::array<std::array<double, 6>, 3> squares{};
 
@@ -47,16 +51,16 @@ std::vector<BlockBends> measureBends(const GridSource& source, uint64_t nodes);
 inline constexpr uint64_t kMaxCutByNeed = 16'000'000;
 
 /// Chooses for each block, along each axis, into 1, 2, 4 or 8 parts its cells should be cut, so that a picture
-/// does not show them (kMaxDeviation), with at most 8 times the nodes, or 1.5 times in grids of more than a
-/// million. Blocks that share the nodes of a face or an edge have as many parts along it. Blocks of
+/// does not show them (kMaxDeviation), with at most 8 times the cells, or 1.5 times in grids of more than a
+/// million nodes. Blocks that share the nodes of a face or an edge have as many parts along it. Blocks of
 /// small grids whose drawn nodes end in stairs are halved: nodes are drawn where one of `scalars` has a value other than
 /// `blank_value`. Throws Error if the grid cannot be read.
 Refinement refinementByNeed(const GridSource& source, const std::vector<uint32_t>& scalars = {},
                             std::optional<double> blank_value = {});
 
-/// A line for users if a picture of the grid will show its cells: what helps. Otherwise empty. `by_need`: whether
-/// refinementByNeed() has chosen its cuts. Looks at some slabs of large grids only. Throws Error if the grid cannot be
-/// read.
+/// A line for users if a picture of the grid will show its cells, with an rms deviation of 2 % and more: what helps. Otherwise
+/// empty. `by_need`: whether refinementByNeed() has chosen its cuts. Looks at some slabs of large grids only. Throws Error if the
+/// grid cannot be read.
 std::string noteOnCells(const GridSource& source, bool by_need = false);
 
 }  // namespace curvisplat

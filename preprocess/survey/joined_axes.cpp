@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "preprocess/grid/slabs.h"
@@ -22,9 +24,9 @@ uint64_t mixed(uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Calls `take` with the nodes of each outer face of the block and their box.
+/// Calls `take` with the nodes of each outer face of the block and their box, `depth` planes thick where the block is.
 template <typename Take>
-void forEachFace(const GridSource& source, uint32_t number, const Take& take) {
+void forEachFace(const GridSource& source, uint32_t number, const Take& take, uint64_t depth = 1) {
   const GridBlock& block = source.description().blocks[number];
   const std::array<uint64_t, 3> counts{block.ni, block.nj, block.nk};
   NodeArrays nodes;
@@ -32,8 +34,9 @@ void forEachFace(const GridSource& source, uint32_t number, const Take& take) {
     for (const uint64_t plane : {uint64_t{0}, counts[axis] - 1}) {
       if (plane == 0 || counts[axis] > 1) {
         std::array<uint64_t, 3> first{}, end = counts;
-        first[axis] = plane;
-        end[axis] = plane + 1;
+        const uint64_t inner = std::min(depth, counts[axis]) - 1;
+        first[axis] = plane == 0 ? 0 : plane - inner;
+        end[axis] = plane == 0 ? 1 + inner : plane + 1;
         const NodeBox box{first[1], end[1], first[2], end[2], first[0], end[0]};
         readBox(source, number, box, {}, nodes);
         take(box, nodes);
@@ -62,7 +65,9 @@ double sizeOf(const GridSource& source) {
 /// Sets of numbers that are joined in pairs.
 class Classes {
  public:
-  explicit Classes(size_t count) : parents_(count) { std::iota(parents_.begin(), parents_.end(), 0u); }
+  explicit Classes(size_t count) {
+    for (uint32_t n = 0; n < count; ++n) parents_.push_back(n);
+  }
 
   uint32_t of(uint32_t n) {
     while (parents_[n] != n) n = parents_[n] = parents_[parents_[n]];
@@ -77,16 +82,17 @@ class Classes {
   std::vector<uint32_t> parents_;
 };
 
-/// Edges of cells by their ends, which are rounded, so that those of other blocks are found.
+/// A number for the place of a node, rounded to `step`, so that nodes of other blocks are found.
+uint64_t placeOf(double x, double y, double z, double step) {
+  const auto bits = [&](double at) { return std::bit_cast<uint64_t>(std::round(at / step) + 0.0); };
+  return mixed(bits(x) + 3 * mixed(bits(y) + 5 * mixed(bits(z))));
+}
+
+/// Edges of cells by their ends.
 class EdgeList {
  public:
-  EdgeList(double resolution, uint64_t all) : step_(resolution), stride_(1 + all / kMaxEdges) {}
+  explicit EdgeList(uint64_t all) : stride_(1 + all / kMaxEdges) {}
 
-  /// A number for the place of a node.
-  uint64_t nodeAt(double x, double y, double z) const {
-    const auto bits = [&](double at) { return std::bit_cast<uint64_t>(std::round(at / step_) + 0.0); };
-    return mixed(bits(x) + 3 * mixed(bits(y) + 5 * mixed(bits(z))));
-  }
   void addEdge(uint64_t first, uint64_t last, uint32_t axis) {
     if (first == last) return;
     const uint64_t key = mixed(first + last);
@@ -99,12 +105,85 @@ class EdgeList {
   }
 
  private:
-  double step_;
   uint64_t stride_;  // of the keys that are kept, the same in all blocks
   std::vector<std::pair<uint64_t, uint32_t>> edges_;
 };
 
+/// A row of a block that ends at an outer face.
+struct RowEnd {
+  uint64_t place;  // placeOf() its last node
+  uint32_t block;
+  uint32_t face;      // two of each axis
+  double part;        // what it adds to its block's deviation, for a tangent of 1
+  glm::dvec3 inward;  // of unit length
+
+  bool operator<(const RowEnd& other) const {
+    return place != other.place ? place < other.place : block < other.block;
+  }
+  /// Whether a row that ends in the same place goes on from this one: that of another block, or the same one's other end.
+  bool goesOnIn(const RowEnd& other) const { return block != other.block || (face ^ other.face) == 1; }
+};
+
+/// The rows that end within the outer faces of all blocks. Those on the edges of faces lead along other faces as well.
+std::vector<RowEnd> rowEndsOf(const GridSource& source, double step) {
+  constexpr double kDeviation = 45;
+  std::vector<RowEnd> ends;
+  for (uint32_t number = 0; number < source.description().blocks.size(); ++number) {
+    const GridBlock& block = source.description().blocks[number];
+    const std::array<uint64_t, 3> whole{block.ni, block.nj, block.nk};
+    if (std::ranges::min(whole) < 3) continue;
+    uint32_t face = 0;
+    forEachFace(
+        source, number,
+        [&](const NodeBox& box, const NodeArrays& nodes) {
+          const uint32_t of_face = face++;
+          const size_t axis = of_face / 2;
+          const bool is_upper = of_face % 2 != 0;
+          const std::array<uint64_t, 3> counts{box.i1 - box.i0, box.j1 - box.j0, box.k1 - box.k0};
+          const std::array<size_t, 3> strides{1, counts[0], counts[0] * counts[1]};
+          const double along = static_cast<double>(whole[axis] - 1);
+          const double part =
+              kDeviation / (along * along *
+                            static_cast<double>((counts[(axis + 1) % 3] - 2) * (counts[(axis + 2) % 3] - 2)));
+          const auto position = [&](size_t n) { return glm::dvec3(nodes.x[n], nodes.y[n], nodes.z[n]); };
+          for (size_t n = 0; n < nodes.x.size(); ++n) {
+            bool is_end = n / strides[axis] % 2 == (is_upper ? 1 : 0);
+            for (const size_t across : {(axis + 1) % 3, (axis + 2) % 3}) {
+              const uint64_t at = n / strides[across] % counts[across];
+              is_end = is_end && at > 0 && at + 1 < counts[across];
+            }
+            if (!is_end || nodes.blank[n] != 0) continue;
+            const glm::dvec3 inward =
+                position(is_upper ? n - strides[axis] : n + strides[axis]) - position(n);
+            if (const double length = glm::length(inward); length > 0 && std::isfinite(length))
+              ends.push_back({placeOf(nodes.x[n], nodes.y[n], nodes.z[n], step), number, of_face, part,
+                              inward / length});
+          }
+        },
+        2);
+  }
+  std::ranges::stable_sort(ends, std::less<>());
+  return ends;
+}
+
 }  // namespace
+
+std::vector<double> deviationAtKinks(const GridSource& source) {
+  constexpr double kSharpest = 5;  // tangent, beyond which blocks lie upon one another
+  std::vector<double> deviations(source.description().blocks.size());
+  const double size = sizeOf(source);
+  if (!(size > 0)) return deviations;
+  const std::vector<RowEnd> ends = rowEndsOf(source, size / kResolution);
+  for (size_t first = 0, last = 0; first < ends.size(); first = last) {
+    while (last < ends.size() && ends[last].place == ends[first].place) ++last;
+    if (last - first != 2) continue;
+    const RowEnd &a = ends[first], &b = ends[first + 1];
+    const double tangent = glm::length(a.inward + b.inward) / glm::length(a.inward - b.inward);
+    if (!a.goesOnIn(b) || !(tangent < kSharpest)) continue;
+    for (const RowEnd* end : {&a, &b}) deviations[end->block] += end->part * tangent * tangent;
+  }
+  return deviations;
+}
 
 std::vector<std::array<uint32_t, 3>> joinedAxes(const GridSource& source) {
   const std::vector<GridBlock>& blocks = source.description().blocks;
@@ -113,13 +192,13 @@ std::vector<std::array<uint32_t, 3>> joinedAxes(const GridSource& source) {
   if (blocks.size() > 1 && size > 0) {
     uint64_t edges = 0;
     for (const GridBlock& b : blocks) edges += 4 * (b.ni * b.nj + b.nj * b.nk + b.nk * b.ni);
-    EdgeList list(size / kResolution, edges);
+    EdgeList list(edges);
     std::vector<uint64_t> nodes;
     for (uint32_t number = 0; number < blocks.size(); ++number)
       forEachFace(source, number, [&](const NodeBox& box, const NodeArrays& arrays) {
         nodes.resize(arrays.x.size());
         for (size_t n = 0; n < nodes.size(); ++n)
-          nodes[n] = list.nodeAt(arrays.x[n], arrays.y[n], arrays.z[n]);
+          nodes[n] = placeOf(arrays.x[n], arrays.y[n], arrays.z[n], size / kResolution);
         const std::array<uint64_t, 3> counts{box.i1 - box.i0, box.j1 - box.j0, box.k1 - box.k0};
         const std::array<size_t, 3> strides{1, counts[0], counts[0] * counts[1]};
         for (uint32_t axis = 0; axis < 3; ++axis)
