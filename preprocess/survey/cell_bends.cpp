@@ -40,8 +40,8 @@ constexpr uint64_t kTinyGrid = 10'000;  // nodes
 constexpr double kMaxStairs = 0.02;
 constexpr uint64_t kLargeGrid = 1'000'000;
 // A picture of the whole grid shows bands of cells the less, the smaller they are: about deviation() where a cell's shortest edge
-// is this part of the grid's diagonal. The estimate has been compared with 1.2 to 19 % that were drawn of 15 grids, and was off by
-// up to a factor of two, but for an O-grid of 79 blocks (2.5 for 19 %).
+// is this part of the grid's diagonal. Fitted to what was drawn of nine grids (1.3 to 5.6 %), whole and cut: off by up to a factor
+// of two to three, and too low for an O-grid of 79 blocks (2.5 for 19 %).
 constexpr double kShownEdge = 0.0195;
 constexpr double kShown = 2;  // % from which on cells are seen
 // A large grid's survey takes a few percent of a conversion.
