@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Kills one of three ranks that add a scalar to a cache, in its passes, and looks at what is left.
+"""Kills one of three ranks that add a scalar to a cache, in every pass, and looks at what is left.
 
     kill_ranks_that_add.py PROGRAM [KILLS [SIZE]]
 
-KILLS (with CURVISPLAT_WHOLE, as tools/test.sh --whole sets it, 20) are those of each pass, at moments spread over it; without them one, in
-one pass of three. After each the job must end within a minute, the cache must have the files that it had, or all of the new ones as well,
-and adding the scalar by 1 to 4 ranks must give the files of one process and leave nothing else behind. dying_ranks lies beside PROGRAM.
-Prints a line for each; exit status 1 if anything was wrong, 77 without mpirun.
+KILLS (default 1; with CURVISPLAT_WHOLE, as tools/test.sh --whole sets it, 20) are those of each pass, at moments spread over it. After each the job must end within a minute, the cache must
+have the files that it had, or all of the new ones as well, and adding the scalar by 1 to 4 ranks must give the files of one process
+and leave nothing else behind. dying_ranks lies beside PROGRAM. Prints a line for each; exit status 1 if anything was wrong, 77
+without mpirun.
 """
 import hashlib
 import os
@@ -16,11 +16,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 
 MPIRUN = ["mpirun", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-q", "-n"]
 SCALAR = "volume"
-USUAL_KILLS = 20 if "CURVISPLAT_WHOLE" in os.environ else None
+USUAL_KILLS = 20 if "CURVISPLAT_WHOLE" in os.environ else 1
 
 
 def digests(cache):
@@ -95,14 +94,12 @@ def main(program, kills=USUAL_KILLS, size="47x40x36"):
         print("skipped: no mpirun (Debian: openmpi-bin), or built without MPI")
         sys.exit(77)
     random.seed(22)
-    first = time.time_ns() // 1000 % 3  # other passes each time
-    every = 1 if kills else 3
     failed = ended = tried = 0
     with tempfile.TemporaryDirectory(prefix="kill_ranks_that_add.") as name:
         additions = Additions(program, pathlib.Path(name), size)
         for number, (of_pass, duration) in enumerate(additions.passes()):
-            for n in range(int(kills or 1) if (number + first) % every == 0 else 0):
-                moment = duration * (n + random.random()) / int(kills or 1)
+            for n in range(int(kills)):
+                moment = duration * (n + random.random()) / int(kills)
                 killed, victim, faults = additions.kill(number, moment)
                 tried += 1
                 ended += killed
