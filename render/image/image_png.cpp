@@ -84,8 +84,8 @@ void writeRow(const Image& image, int y, bool opaque, png_bytep row) {
 }
 
 bool writeAll(PngWriter& writer, Bytes& out, const Image& image, PngEffort effort, png_bytep row) {
-  const bool opaque = isOpaque(image);
   if (setjmp(png_jmpbuf(writer.png))) return false;
+  const bool opaque = isOpaque(image);
   png_set_write_fn(writer.png, &out, appendBytes, nullptr);
   png_set_user_limits(writer.png, kLargestImageSide, kLargestImageSide);
   if (effort == PngEffort::kQuick) {
