@@ -61,6 +61,16 @@ class UnityGroups(unittest.TestCase):
             "LIMIT", "Words", "kRatio", "kLeft", "kRight", "kSides", "table", "counter", "Kind", "sorted", "Lines", "Suite_Holds", "Other_Holds",
             "All_Other"})
 
+    def test_uses_of_macros_and_texts_in_other_languages_declare_nothing(self):
+        shader = 'const char* const kShader = R"glsl(\nlayout(local_size_x = 8) in;\nvoid main() {\n}\n)glsl";\nint after() {\n'
+        self.assertEqual(unity_groups.names(shader), {"kShader", "after"})
+        self.assertEqual(unity_groups.names("BENCHMARK(sort)->Arg(3);\nstatic_assert(sizeof(int) == 4);\n"), set())
+
+    def test_a_source_that_defines_what_its_header_declares_is_with_others_that_include_it(self):
+        defines = HEADER + "Blocks twoBlocks() {"
+        self.assertEqual(unity_groups.groups([defines, HEADER], 10), [0, 0])
+        self.assertEqual(unity_groups.groups([defines, "int twoBlocks() {"], 10), [0, 1])
+
     def test_sources_with_a_name_in_common_are_apart(self):
         a, b, c = "int first() {", "int second() {", "bool first(double x) {"
         self.assertEqual(unity_groups.groups([a, b, c, b], 10), [0, 0, 1, 1])
