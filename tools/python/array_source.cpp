@@ -21,7 +21,7 @@ namespace {
 
 using ArrayShape = std::array<uint64_t, 3>;  // k, j, i
 
-std::string textOf(const ArrayShape& shape) {
+std::string shapeText(const ArrayShape& shape) {
   return fmt::format("({}, {}, {})", shape[0], shape[1], shape[2]);
 }
 
@@ -100,8 +100,8 @@ class ArrayView {
 
 void requireShape(const ArrayView& array, const ArrayShape& expected, const std::string& what) {
   if (array.shape() != expected)
-    throw UsageError("{}: the array has the shape {}; expected {}, as x has", what, textOf(array.shape()),
-                     textOf(expected));
+    throw UsageError("{}: the array has the shape {}; expected {}, as x has", what, shapeText(array.shape()),
+                     shapeText(expected));
 }
 
 struct BlockViews {
@@ -115,7 +115,8 @@ BlockViews viewsOf(const BlockArrays& block, const ScalarNames& names) {
   BlockViews views{{block.x, named("x")}, {block.y, named("y")}, {block.z, named("z")}, {}, {}};
   const ArrayShape shape = views.x.shape();
   if (std::min({shape[0], shape[1], shape[2]}) == 0)
-    throw UsageError("{}: the array has the shape {}; expected at least one node", named("x"), textOf(shape));
+    throw UsageError("{}: the array has the shape {}; expected at least one node", named("x"),
+                     shapeText(shape));
   requireShape(views.y, shape, named("y"));
   requireShape(views.z, shape, named("z"));
   for (const ArrayView* array : {&views.x, &views.y, &views.z})
@@ -140,7 +141,7 @@ Centring centringOf(const ArrayView& scalar, const ArrayShape& nodes, const std:
   const ArrayShape cells{nodes[0] - 1, nodes[1] - 1, nodes[2] - 1};
   if (std::min({nodes[0], nodes[1], nodes[2]}) > 1 && scalar.shape() == cells) return Centring::kCell;
   throw UsageError("{}: the array has the shape {}; expected {} (values at nodes) or {} (in cells)", what,
-                   textOf(scalar.shape()), textOf(nodes), textOf(cells));
+                   shapeText(scalar.shape()), shapeText(nodes), shapeText(cells));
 }
 
 /// Products of larger ones would not fit in 64 bits.
@@ -148,7 +149,7 @@ void requireFewNodes(const ArrayShape& shape) {
   uint64_t nodes = 1;
   for (const uint64_t length : shape) {
     if (length > 0 && nodes > (kMaxNodes - 1) / length)
-      throw UsageError("the shape {} has too many nodes; at most {} can be converted", textOf(shape),
+      throw UsageError("the shape {} has too many nodes; at most {} can be converted", shapeText(shape),
                        kMaxNodes - 1);
     nodes *= std::max<uint64_t>(length, 1);
   }
