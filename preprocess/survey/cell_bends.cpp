@@ -415,8 +415,10 @@ std::string noteOnCells(const GridSource& source, bool by_need) {
   size_t count = 0;
   for (size_t block = 0; block < blocks.size(); ++block) {
     volume += bends[block].volume;
-    const double deviation =
-        std::hypot(bends[block].deviation() * bends[block].shortest / edge, kinks[block]);
+    const double bend = bends[block].deviation();
+    const double of_bends =
+        bend > kMaxDeviation ? bend * bends[block].shortest / edge : 0;  // else cut enough, or even
+    const double deviation = std::hypot(of_bends, kinks[block]);
     if (!(deviation > kShown)) continue;
     ++count;
     shown += bends[block].volume;

@@ -238,7 +238,7 @@ TEST(Plot3dDamage, WrongKindsAreNamed) {
   expectSays(as_solution, "it would fit as a grid of 1 block of 6x5x4");
   layout.kind = Plot3dKind::kQ;
   const std::string as_grid = plot3dError(folder, plot3dBytes(layout, {testBlock(6, 5, 4, 5)}));
-  expectSays(as_grid, "it would fit as a Q solution of 1 block of 6x5x4");
+  expectSays(as_grid, "looks like a solution without its grid (a Q solution of 1 block of 6x5x4");
 }
 
 /// A disk whose blocks from some offset on cannot be read.

@@ -274,7 +274,7 @@ TEST_F(RealFiles, ForeignFilesAreNamed) {
 
 TEST_F(RealFiles, ASolutionIsRefusedAsAGrid) {
   const std::string error = errorOf("bluntfin/bluntfinq.bin");
-  expectSays(error, "looks like a solution without its grid (a Q file of 1 block of 40x32x32");
+  expectSays(error, "looks like a solution without its grid (a Q solution of 1 block of 40x32x32");
   expectSays(error, "choose its grid, too");
 }
 
