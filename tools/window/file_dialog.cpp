@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <cstdlib>
 #include <iterator>
 #include <sstream>
@@ -289,7 +288,7 @@ void FileDialog::drawSize() {
 
 /// Pictures a second, and how long that takes.
 void FileDialog::drawRate() {
-  constexpr double kMax = 120, kMaxFrames = 10'000;
+  constexpr double kMax = 120;
   ImGui::AlignTextToFramePadding();
   ImGui::TextUnformatted("rate");
   ImGui::SameLine();
@@ -301,31 +300,20 @@ void FileDialog::drawRate() {
   ImGui::TextUnformatted("pictures a second,");
   ImGui::SameLine();
   if (movie_.chosen_frames > 0) {
+    constexpr int kMaxFrames = 10'000;
     int chosen = static_cast<int>(movie_.chosen_frames);
     ImGui::SetNextItemWidth(5 * ImGui::GetFontSize());
     ImGui::InputInt("##frames", &chosen, 0, 0);
     nameWidget("movie pictures");
-    movie_.chosen_frames = static_cast<uint64_t>(std::clamp(chosen, 1, static_cast<int>(kMaxFrames)));
+    movie_.chosen_frames = static_cast<uint64_t>(std::clamp(chosen, 1, kMaxFrames));
     ImGui::SameLine();
   }
   const uint64_t frames =
       movie_.chosen_frames > 0 ? movie_.chosen_frames : movie_.frames(movie_.frames_per_s);
   const double seconds = static_cast<double>(frames) / movie_.frames_per_s;
   const std::string pictures = countText(frames, "picture");
-  if (movie_.chosen_frames > 0) {
-    ImGui::TextUnformatted("pictures in all:");
-    ImGui::SameLine();
-    double wanted = seconds;
-    ImGui::SetNextItemWidth(5 * ImGui::GetFontSize());
-    if (ImGui::InputDouble("##seconds", &wanted, 0, 0, "%.4g"))
-      movie_.chosen_frames =
-          static_cast<uint64_t>(std::clamp(std::round(wanted * movie_.frames_per_s), 1.0, kMaxFrames));
-    nameWidget("movie seconds");
-    ImGui::SameLine();
-    ImGui::TextUnformatted("s");
-  } else {
-    ImGui::TextUnformatted(fmt::format("{}: {:.1f} s", pictures, seconds).c_str());
-  }
+  ImGui::TextUnformatted(movie_.chosen_frames > 0 ? fmt::format("pictures in all: {:.1f} s", seconds).c_str()
+                                                  : fmt::format("{}: {:.1f} s", pictures, seconds).c_str());
   nameWidget(fmt::format("movie of pictures a second: {}, {:.1f} s", pictures, seconds));
 }
 
@@ -335,7 +323,7 @@ void FileDialog::drawEntries(bool& accepts) {
   std::optional<fs::path> entered;
   if (entries_.empty())
     ImGui::TextDisabled("%s", lookOf(*purpose_).saves
-                                  ? "This folder has no such file: a new one is made."
+                                  ? "There is no such file in this folder yet."
                                   : "No file in this folder is of a kind that can be chosen here.");
   for (const FolderEntry& entry : entries_) {
     const std::string shown = entry.is_folder ? entry.name + "/" : entry.name;
