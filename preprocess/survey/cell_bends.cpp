@@ -220,6 +220,13 @@ class CutChoice {
       }
   }
 
+  /// The cells of all blocks, as they are cut.
+  uint64_t cells() const {
+    uint64_t sum = 0;
+    for (uint32_t block = 0; block < blocks_.size(); ++block) sum += cellsOf(blocks_[block], cutsOf(block));
+    return sum;
+  }
+
   /// Cuts cells along the axes that need it. `most`: cells.
   void cutByNeed(uint64_t most) {
     struct Waiting {
@@ -235,7 +242,7 @@ class CutChoice {
         waiting.push({squareOf(block, cutsOf(block)), block});
     };
     for (uint32_t block = 0; block < blocks_.size(); ++block) wait(block);
-    uint64_t cells = this->cells();
+    uint64_t all_cells = cells();
     while (!waiting.empty()) {
       const Waiting worst = waiting.top();
       waiting.pop();
@@ -243,10 +250,10 @@ class CutChoice {
         wait(worst.block);
         continue;
       }
-      const std::optional<Cut> best = bestCut(worst.block, most - cells);
+      const std::optional<Cut> best = bestCut(worst.block, most - all_cells);
       if (!best) continue;
       for (const uint32_t of_class : best->classes) of_classes_[of_class] *= 2;
-      cells += best->cells;
+      all_cells += best->cells;
       wait(worst.block);
     }
   }
@@ -283,11 +290,6 @@ class CutChoice {
   CellCuts cutsOf(uint32_t block) const {
     const std::array<uint32_t, 3>& classes = classes_[block];
     return {of_classes_[classes[0]], of_classes_[classes[1]], of_classes_[classes[2]]};
-  }
-  uint64_t cells() const {
-    uint64_t sum = 0;
-    for (uint32_t block = 0; block < blocks_.size(); ++block) sum += cellsOf(blocks_[block], cutsOf(block));
-    return sum;
   }
   double squareOf(uint32_t block, const CellCuts& cuts) const {
     const double deviation = bends_[block].deviation(cuts);
@@ -391,10 +393,9 @@ Refinement refinementByNeed(const GridSource& source, const std::vector<uint32_t
   bool halves = false;
   for (uint32_t block = 0; block < blocks.size(); ++block) halves |= is_halved(block);
   if (!shows && !halves) return {};
-  uint64_t cells = 0;
-  for (const GridBlock& block : blocks) cells += cellsOf(block);
-  const uint64_t most = nodes > kLargeGrid ? cells + cells / 2 : 8 * cells;
   CutChoice choice(blocks, bends, joinedAxes(source), max);
+  const uint64_t cells = choice.cells();  // not cut yet
+  const uint64_t most = nodes > kLargeGrid ? cells + cells / 2 : 8 * cells;
   choice.cutByNeed(most);
   choice.halveWhole(is_halved, most);
   return choice.chosen();

@@ -65,6 +65,7 @@ double sizeOf(const GridSource& source) {
 /// Sets of numbers that are joined in pairs.
 class Classes {
  public:
+  // GCC 12 takes std::iota into parents_(count) for a write beyond an empty vector, with a warning.
   explicit Classes(size_t count) {
     for (uint32_t n = 0; n < count; ++n) parents_.push_back(n);
   }
