@@ -218,11 +218,13 @@ def grids():
         return lattice(u, u, u, lambda x, y, z: tuple(x * (1 - y) * a[n] + x * y * b[n] + (1 - x) * y * c[n] for n in (0, 1)) + (z,))
     yield "corner", [nodes(patch(corner[1 + 2 * n], corner[2 + 2 * n], corner[1 + (2 * n + 2) % 6]), height) for n in range(3)]
 
-    def hill(x, y, s):
-        ground = 3 * np.exp(-((x - 5) ** 2 + (y - 5) ** 2) / 3)
-        return x, y, ground + s * (5 - ground)
-    flat = np.linspace(0, 10, 33)
-    yield "terrain", [nodes(lattice(flat, flat, np.linspace(0, 1, 17) ** 2, hill), height)]
+    def hills(x, y, s):  # drawn ten times as high
+        ground = 6 + 2 * np.sin(2.1 * x + 0.7 * y) + 2 * np.sin(1.3 * x - 2.3 * y + 1) + np.sin(3.9 * x + 2.5 * y)
+        return x, y, ground + s * (16 - ground)
+    flat = np.linspace(0, 8, 25)
+    layers = lattice(flat, flat, np.linspace(0, 1, 9) ** 1.5, hills)
+    yield "terrain", [nodes(layers, height)]
+    yield "terrain_cells", [cells(layers, height)]
     sheared = lattice(np.linspace(0, 1, 17), np.linspace(0, 1, 17), np.linspace(0, 1, 17), lambda x, y, z: (x + 6 * z, y, z))
     yield "sheared", [nodes(sheared, height)]
     twist = lattice(np.linspace(1, 2, 13), np.linspace(0, 2 * np.pi, 49), np.linspace(0, 1, 9),
@@ -388,9 +390,9 @@ LIMITS = {
     "sphere_5": (0.05, 0.6, 1.03, 3, 0.05),
     "joint": (0.02, 0.6, 1.03, 9, 0.05),
     "corner": (0.02, 0.9, 1.05, 10, 0.05),
-    "terrain": (0.02, 1.2, 1.06, 9, 0.05),
+    "terrain": (0.02, 1.1, 1.05, 9, 0.05),
     "sheared": (0.02, 0.9, 1.05, 10, 0.05),
-    "field_lines": (0.02, 1.8, 1.09, 10, 0.05),
+    "field_lines": (0.02, 1.2, 1.06, 10, 0.05),
     "sea_floor": (0.02, 0.9, 1.05, 12, 0.05),
     "sea_floor_cells": (0.02, 1.5, 1.07, 12, 0.05),
     "octree": (0.02, 3.2, 1.15, 13, 0.05),

@@ -127,14 +127,15 @@ SplatRules rulesOf(const Manifest& manifest) {
   SplatRules rules;
   rules.steep = manifest.isSteep();
   rules.octants = manifest.hasFeature(kCellOctants);
-  rules.dual_cells = manifest.stretch == kDualCells;
+  rules.dual_cells = manifest.hasDualCells();
+  rules.widths = manifest.stretch == kCellWidths;
   return rules;
 }
 
 UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
   const bool first_version = manifest.requirements.empty();
   if (first_version) return UnlikeHalves::kMerged;
-  return manifest.stretch == kDualCells ? UnlikeHalves::kApart : UnlikeHalves::kApartInCells;
+  return manifest.hasDualCells() ? UnlikeHalves::kApart : UnlikeHalves::kApartInCells;
 }
 
 ThinWalls thinWallsOf(const CacheReader& cache) {

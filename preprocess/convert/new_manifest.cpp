@@ -51,7 +51,7 @@ Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, co
   manifest.overlap = splats.overlap;
   manifest.cells = origin.centring() == Centring::kCell;
   if (manifest.cells && description.pieces.empty()) manifest.requirements.push_back(kBorderPairs);
-  if (description.pieces.empty()) manifest.stretch = kDualCells;
+  if (description.pieces.empty()) manifest.stretch = kCellWidths;
   if (splats.counts.hanging > 0) manifest.stretch = kHangingNodes;
   manifest.refinement = description.refinement;
   manifest.globe = description.globe;

@@ -43,6 +43,7 @@ class Cells {
                box.k0 - std::min<uint64_t>(box.k0, kReach), std::min(box.k1 + kReach, in.block.nk - 1)},
         cells_i_(in.block.ni - 1),
         single_(singleAxes(in.block, rules)),
+        by_widths_(rules.widths),
         i0_(in.i0),
         i1_(in.endOfPart(cells_i_)),
         known_i0_(i0_ - std::min(i0_, kReach)),
@@ -96,6 +97,7 @@ class Cells {
   const NodeBox known_;                 // cells that are in the scratch: the box and its neighbours
   const uint64_t cells_i_;              // of a row
   const uint32_t single_;               // bit `axis`: the block is one cell thick along it
+  const bool by_widths_;                // SplatRules::widths
   const uint64_t i0_, i1_;              // its part
   const uint64_t known_i0_, known_i1_;  // with its neighbours
   const SplatCorrections corrections_ = correctionsToMake().splats;
@@ -133,7 +135,7 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
   if (in_box_j) measureRow(j, k, 2);
 }
 
-/// The extents of a row's cells along one axis: the mean of four edges.
+/// The extents of a row's cells along one axis: the mean of four edges, and of it what lies across the faces (CellWidths).
 void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
   const std::array<size_t, 3> strides{1, row_stride_, plane_stride_};
   const size_t along = strides[axis], across = strides[(axis + 1) % 3], other = strides[(axis + 2) % 3];
@@ -142,13 +144,20 @@ void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
                *z = in_.nodes->z.data() + node;
   double* out = scratch_.extent[axis].data() + cellAt(known_i0_, j, k);
   for (size_t i = 0; i < known_i1_ - known_i0_; ++i) {
-    const auto edges = [&](const double* a) {
-      const double* b = a + along;
-      return ((b[i] - a[i]) + (b[i + across] - a[i + across])) +
-             ((b[i + other] - a[i + other]) + (b[i + across + other] - a[i + across + other]));
+    const auto edges = [&](size_t step, size_t beside, size_t above) {
+      const auto of = [&](const double* a) {
+        const double* b = a + step;
+        return ((b[i] - a[i]) + (b[i + beside] - a[i + beside])) +
+               ((b[i + above] - a[i + above]) + (b[i + beside + above] - a[i + beside + above]));
+      };
+      return glm::dvec3(of(x), of(y), of(z));
     };
-    const double dx = edges(x), dy = edges(y), dz = edges(z);
-    out[i] = dx * dx + dy * dy + dz * dz;
+    const glm::dvec3 own = edges(along, across, other);
+    out[i] = glm::dot(own, own);
+    if (!by_widths_) continue;
+    const glm::dvec3 normal = glm::cross(edges(across, other, along), edges(other, along, across));
+    const double area = glm::dot(normal, normal), volume = glm::dot(own, normal);
+    if (area > 0) out[i] = volume * volume / area;
   }
 }
 

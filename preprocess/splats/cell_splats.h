@@ -39,14 +39,14 @@ inline constexpr Halo kCellSplatHalo{2, 3};
 struct CellScratch {
   std::vector<glm::dvec3> centre;
   std::vector<uint8_t> there;
-  std::array<std::vector<double>, 3> extent;  // along i, j, k: 16 times the cell's squared length
+  std::array<std::vector<double>, 3> extent;  // along i, j, k: 16 times the cell's squared width
 };
 
 /// Computes the splats of the cells whose lowest nodes are in `box`, except for cells with a blanked corner
 /// or value. A splat has the number of its cell's lowest node; the upper half of a cell, that of the next
 /// node along the axis. `in.window` is `box` with kCellSplatHalo around it inside the block; `in.nodes` are
-/// as a NodeReader of cell-centred scalars reads them. Overwrites `out` and keeps its capacity. Only the rule
-/// `dual_cells` (halves in blocks one cell thick) and the corrections `stretch` and `growth` apply to cells.
+/// as a NodeReader of cell-centred scalars reads them. Overwrites `out` and keeps its capacity. Only the rules
+/// `dual_cells` (halves in blocks one cell thick) and `widths` and the corrections `stretch` and `growth` apply to cells.
 /// Pure: any thread. Throws nothing but bad_alloc.
 void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
                        NodeSplats& out, const SplatRules& rules = {});

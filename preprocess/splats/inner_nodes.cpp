@@ -192,7 +192,7 @@ HWY_INLINE Factors stageGeometry(const InnerRow& row, size_t node, size_t lane, 
   const V3 here = load(row.positions, at);
   V3 jacobian[3], second[3], bend{zero, zero, zero}, aside{zero, zero, zero};
   V stretch[3], middle[3];
-  V distance[3][2];  // to the neighbours along an axis
+  V distance[3][2];  // to the neighbours along an axis, across the faces
   V3 to_neighbours[3][2];
   for (size_t axis = 0; axis < 3; ++axis) {
     const V3 before = load(row.positions, at - row.strides[axis]),
@@ -202,8 +202,11 @@ HWY_INLINE Factors stageGeometry(const InnerRow& row, size_t node, size_t lane, 
     to_neighbours[axis][0] = to_before;
     to_neighbours[axis][1] = to_after;
     second[axis] = to_after - to_before;
-    distance[axis][0] = length(to_before);
-    distance[axis][1] = length(to_after);
+  }
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const V3 across = cross(jacobian[(axis + 1) % 3], jacobian[(axis + 2) % 3]);
+    for (size_t side = 0; side < 2; ++side)
+      distance[axis][side] = hn::Abs(dot(to_neighbours[axis][side], across));
   }
   V growth[3];
   hn::Store(hn::Abs(gentleVolume(row, at, jacobian, second, growth)), d, out.weight + lane);

@@ -30,7 +30,7 @@ class NodeWindow {
              NodeSplats& out)
       : in_(in),
         rules_(rules),
-        lines_(in, box, rules.fit(), scratch),
+        lines_(in, box, rules.fit(), rules.widths, scratch),
         lattice_(lines_.lattice()),
         faces_(lattice_, corrections_.middles),
         ni_(in.block.ni),
@@ -123,7 +123,7 @@ void NodeWindow::addRow(uint64_t j, uint64_t k) {
   // Those that are neither at a face nor behind one.
   const uint64_t inner_begin = std::max<uint64_t>(2, i0_), inner_end = ni_ < 4 ? 0 : std::min(i1_, ni_ - 2);
   const bool at_once = !on_face && !has_layer && !in_.covered && corrections_.all() && rules_.dual_cells &&
-                       inner_end >= inner_begin + kInnerNodesAtOnce;
+                       rules_.widths && inner_end >= inner_begin + kInnerNodesAtOnce;
   if (!lines_.anyBlankAround(j, k)) {
     if (i0_ == 0) addNode(0, row, at_i(0), true, layers_at(0));
     for (uint64_t i = std::max<uint64_t>(1, i0_); i < std::min(i1_, ni_ - 1); ++i) {
@@ -351,7 +351,7 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
                             lattice_.position(at + neighbours.before[axis]));
 
   // Where the middle of the cell is from the node along its columns, in cells. The cell reaches half way to
-  // either neighbour, at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one
+  // either neighbour, at distances a and b across its faces: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one
   // neighbour only, that is a quarter of the difference, inwards, of the splat's length: its border stays.
   glm::dvec3 middle(0.0);
   glm::dvec3 bend(0.0);             // the sum of the positions' second differences
@@ -365,10 +365,15 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
   for (int axis = 0; axis < 3; ++axis) {
     const glm::dvec3 to_before = node.node_position - lattice_.position(at + neighbours.before[axis]);
     const glm::dvec3 to_after = lattice_.position(at + neighbours.after[axis]) - node.node_position;
-    const double a = glm::length(to_before), b = glm::length(to_after);
+    double a = glm::length(to_before), b = glm::length(to_after);
     if (a > 0) nearest = std::min(nearest, a);
     if (b > 0) nearest = std::min(nearest, b);
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
+    if (whole && rules_.widths) {
+      const glm::dvec3 across = glm::cross(jacobian[(axis + 1) % 3], jacobian[(axis + 2) % 3]);
+      a = std::abs(glm::dot(to_before, across));
+      b = std::abs(glm::dot(to_after, across));
+    }
     const double width = whole ? widths[static_cast<size_t>(axis)] : 0.0;
     stretch[axis] *= 1 - kWidthShare * (width * width);
     if (whole) {

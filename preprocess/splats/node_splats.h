@@ -141,6 +141,7 @@ struct SplatRules {
   // Weights and scalars of dual cells (dual_cell.h); otherwise weights are |det J|, and the scalars of bent
   // layers follow their slopes however far (kMaxBend).
   bool dual_cells = true;
+  bool widths = true;  // cells are as long as CellLengths says (stretch.h), else as their grid lines
   // Growth codes of all splats; otherwise only splats for seams have them: values do not depend on them, and
   // they take a sixth of the time.
   bool growth_codes = true;

@@ -11,37 +11,70 @@ namespace curvisplat {
 
 namespace {
 
-/// stretchNodes(). Returns whether any cell may have terms for steep growth.
+constexpr size_t kAtOnce = 64;
+
+/// The squared extents, times four, of the cells of up to kAtOnce nodes, and of the two before and after each on its line: as
+/// CellLengths::squared() finds them, in loops that become vector instructions.
+struct ExtentsAround {
+  double of[5][kAtOnce];  // [steps + 2][node]
+
+  [[gnu::always_inline]] inline ExtentsAround(const NodeRow& row, size_t first, size_t count) {
+    const ptrdiff_t at = row.at + static_cast<ptrdiff_t>(first);
+    const double *const x = row.nodes.x + at, *const y = row.nodes.y + at, *const z = row.nodes.z + at;
+    const ptrdiff_t last = static_cast<ptrdiff_t>(count), along = row.stride;
+    double normal[3][kAtOnce], area[kAtOnce];
+    const ptrdiff_t p = row.across[0], q = row.across[1];
+    for (ptrdiff_t n = 0; n < last; ++n) {
+      const double px = x[n + p] - x[n - p], py = y[n + p] - y[n - p], pz = z[n + p] - z[n - p];
+      const double qx = x[n + q] - x[n - q], qy = y[n + q] - y[n - q], qz = z[n + q] - z[n - q];
+      const double nx = py * qz - qy * pz, ny = pz * qx - qz * px, nz = px * qy - qx * py;
+      normal[0][n] = nx;
+      normal[1][n] = ny;
+      normal[2][n] = nz;
+      area[n] = nx * nx + ny * ny + nz * nz;
+    }
+    for (ptrdiff_t steps = 0; steps < 5; ++steps) {
+      const ptrdiff_t from = (steps - 3) * along, to = (steps - 1) * along;
+      for (ptrdiff_t n = 0; n < last; ++n) {
+        const double wx = x[n + to] - x[n + from], wy = y[n + to] - y[n + from], wz = z[n + to] - z[n + from];
+        const double volume = wx * normal[0][n] + wy * normal[1][n] + wz * normal[2][n];
+        const double across = volume * volume / (area[n] > 0 ? area[n] : 1);
+        of[steps][n] = area[n] > 0 ? across : wx * wx + wy * wy + wz * wz;
+      }
+    }
+  }
+};
+
+/// stretchNodes() of up to kAtOnce nodes. Returns whether any cell may have terms for steep growth.
 template <StretchFit kFit>
-[[gnu::always_inline]] inline bool stretchRow(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride,
-                                              size_t count, const StretchRow& out) {
+[[gnu::always_inline]] inline bool stretchSome(const ExtentsAround& extents, size_t count,
+                                               const StretchRow& out) {
   constexpr double kGentle =
       5.3;  // of squared extents that are two cells apart: e to twice the slope is less
-  float *const factor = out.factor, *const growth = out.growth, *const drift = out.drift;
-  const auto last = at + static_cast<ptrdiff_t>(count);
+  const auto& [before2, before, own, after, after2] = extents.of;
   int any_steep = 0;
-  for (ptrdiff_t n = at; n < last; ++n) {
-    // Twice the extents: their ratios count.
-    const auto extent = [&](ptrdiff_t steps) {
-      return nodes.squaredDistance(n + (steps - 1) * stride, n + (steps + 1) * stride);
-    };
-    const double before = extent(-1), after = extent(1);
-    const Stretch found = stretchOf(extent(-2), before, extent(0), after, extent(2), kFit);
-    factor[n - at] = found.factor;
-    growth[n - at] = found.growth;
-    drift[n - at] = found.drift;
-    any_steep |= static_cast<int>(after > kGentle * before) | static_cast<int>(before > kGentle * after);
+  for (size_t n = 0; n < count; ++n) {
+    const Stretch found = stretchOf(before2[n], before[n], own[n], after[n], after2[n], kFit);
+    out.factor[n] = found.factor;
+    out.growth[n] = found.growth;
+    out.drift[n] = found.drift;
+    any_steep |=
+        static_cast<int>(after[n] > kGentle * before[n]) | static_cast<int>(before[n] > kGentle * after[n]);
   }
   return any_steep != 0;
 }
 
 }  // namespace
 
-CURVISPLAT_VECTOR_CLONES void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride,
-                                           size_t count, const StretchRow& out, StretchFit fit) {
-  // The terms for steep growth are zero in most rows, and take time.
-  if (stretchRow<StretchFit::kGentle>(nodes, at, stride, count, out) && fit == StretchFit::kSteep)
-    stretchRow<StretchFit::kSteep>(nodes, at, stride, count, out);
+CURVISPLAT_VECTOR_CLONES void stretchNodes(const NodeRow& row, const StretchRow& out, StretchFit fit) {
+  for (size_t done = 0; done < row.count; done += kAtOnce) {
+    const size_t some = std::min(kAtOnce, row.count - done);
+    const ExtentsAround extents(row, done, some);
+    const StretchRow of_some{out.factor + done, out.growth + done, out.drift + done};
+    // The terms for steep growth are zero in most rows, and take time.
+    if (stretchSome<StretchFit::kGentle>(extents, some, of_some) && fit == StretchFit::kSteep)
+      stretchSome<StretchFit::kSteep>(extents, some, of_some);
+  }
 }
 
 namespace {
@@ -51,11 +84,11 @@ class LineEnd {
  public:
   /// `inwards`: the stride from the end node into the line, which has at least two nodes; `samples` of them
   /// are known.
-  LineEnd(const NodePositions& nodes, ptrdiff_t end, ptrdiff_t inwards, int samples)
-      : nodes_(nodes), end_(end), inwards_(inwards) {
+  LineEnd(const CellLengths& cells, ptrdiff_t end, ptrdiff_t inwards, int samples)
+      : cells_(cells), end_(end), inwards_(inwards) {
     // The end node's extent is of one side only. On a steady line, whose neighbours are g times as far apart
     // from step to step, it is (1 + 1/g)/2 as long.
-    own_ = 4 * nodes_.squaredDistance(end_, end_ + inwards_);
+    own_ = 4 * cells_.squared(end_, end_ + inwards_);
     if (samples <= kStretchReach) return;
     growth_ = steadyGrowth(inner(1), inner(2), inner(3));
     const double half = 0.5 * (1 + 1 / std::sqrt(growth_));
@@ -74,28 +107,28 @@ class LineEnd {
 
  private:
   double inner(ptrdiff_t steps) const {
-    return nodes_.squaredDistance(end_ + (steps - 1) * inwards_, end_ + (steps + 1) * inwards_);
+    return cells_.squared(end_ + (steps - 1) * inwards_, end_ + (steps + 1) * inwards_);
   }
 
-  const NodePositions& nodes_;
+  const CellLengths& cells_;
   ptrdiff_t end_, inwards_;
   double growth_ = 1, own_ = 0;
 };
 
 }  // namespace
 
-SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before,
+SquaredExtents extentsOnLine(const CellLengths& cells, ptrdiff_t at, ptrdiff_t stride, int before,
                              int after) {
   before = std::min(before, kStretchReach);
   after = std::min(after, kStretchReach);
   if (before + after == 0) return {};
   if (before + after == 1) {
-    const double own = 4 * nodes.squaredDistance(at, at + (after - before) * stride);
+    const double own = 4 * cells.squared(at, at + (after - before) * stride);
     return {own, own, own, own, own};
   }
   const int samples = before + 1 + after;
-  const LineEnd first(nodes, at - before * stride, stride, samples);
-  const LineEnd last(nodes, at + after * stride, -stride, samples);
+  const LineEnd first(cells, at - before * stride, stride, samples);
+  const LineEnd last(cells, at + after * stride, -stride, samples);
   // A line is reflected at either end as often as it takes; where there are `kStretchReach` samples on a
   // side, its end is out of sight.
   const auto extent = [&](int steps, const auto& self) -> double {
@@ -103,7 +136,7 @@ SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t
     if (steps > after) return last.beyond(steps - after, self(2 * after - steps, self));
     if (steps == -before && before < kStretchReach) return first.own();
     if (steps == after && after < kStretchReach) return last.own();
-    return nodes.squaredDistance(at + (steps - 1) * stride, at + (steps + 1) * stride);
+    return cells.squared(at + (steps - 1) * stride, at + (steps + 1) * stride);
   };
   const double before2 = extent(-2, extent), near_before = extent(-1, extent);
   const double near_after = extent(1, extent), after2 = extent(2, extent);

@@ -130,24 +130,48 @@ struct NodePositions {
   }
 };
 
+/// How long the cells around a node are along a grid line: as far as they reach across the faces of the node's own cell. It is the
+/// length along the line where lines cross at right angles. Where layers are sheared, as over mountains, the line lengthens from
+/// cell to cell, and the cells do not.
+struct CellLengths {
+  NodePositions nodes;
+  /// The normal of those faces, as long as they are large. Zero: lengths along the line, as in caches without kCellWidths
+  /// (stream/cache/manifest.h).
+  glm::dvec3 normal{0.0};
+
+  /// The square of how far two nodes of the line are apart.
+  double squared(ptrdiff_t from, ptrdiff_t to) const {
+    const glm::dvec3 way(nodes.x[to] - nodes.x[from], nodes.y[to] - nodes.y[from],
+                         nodes.z[to] - nodes.z[from]);
+    const double area = dotOf(normal, normal), volume = dotOf(way, normal);
+    return area > 0 ? volume * volume / area : dotOf(way, way);
+  }
+  static double dotOf(const glm::dvec3& a, const glm::dvec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+};
+
+/// Nodes that follow one another in memory, each with three neighbours on either side along an axis, and one along the others.
+struct NodeRow {
+  NodePositions nodes;
+  ptrdiff_t at;      // element of the first one
+  ptrdiff_t stride;  // of the axis
+  size_t count;
+  std::array<ptrdiff_t, 2> across{};  // strides of the two other axes; 0: lengths along the lines
+};
+
 /// Stretch of the nodes of a row.
 struct StretchRow {
   float *factor, *growth, *drift;
 };
 
-/// Finds the stretches of `count` nodes that follow `at` in memory, along the axis of `stride`. Each has
-/// three neighbours on either side. The same bits as stretchOf(extentsOnLine()) would give. Any thread; never
-/// allocates.
-void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count,
-                  const StretchRow& out, StretchFit fit = StretchFit::kSteep);
+/// Finds the stretches of a row of nodes. The same bits as stretchOf(extentsOnLine()) would give. Any thread; never allocates.
+void stretchNodes(const NodeRow& row, const StretchRow& out, StretchFit fit = StretchFit::kSteep);
 
 /// Twice the extents, squared, of five cells in a row.
 using SquaredExtents = std::array<double, 5>;
 
 /// The squared extents around the node `at`, which has `before` neighbours in a row on one side and `after`
 /// on the other; more than kStretchReach count as kStretchReach. All zero if it has none.
-SquaredExtents extentsOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before,
-                             int after);
+SquaredExtents extentsOnLine(const CellLengths& cells, ptrdiff_t at, ptrdiff_t stride, int before, int after);
 
 inline Stretch stretchOf(const SquaredExtents& e, StretchFit fit = StretchFit::kSteep) {
   return stretchOf(e[0], e[1], e[2], e[3], e[4], fit);

@@ -17,7 +17,8 @@ NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
 
 }  // namespace
 
-WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit fit, NodeScratch& scratch)
+WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit fit, bool by_widths,
+                         NodeScratch& scratch)
     : in_(in),
       near_(rowsAround(box, in.window)),
       lattice_{in.nodes->x.data(), in.nodes->y.data(), in.nodes->z.data(), in.nodes->blank.data()},
@@ -26,7 +27,9 @@ WindowLines::WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit f
       i1_(in.endOfPart(in.block.ni)),
       row_stride_(static_cast<ptrdiff_t>(in.window.rowNodes(ni_))),
       plane_stride_(row_stride_ * static_cast<ptrdiff_t>(in.window.j1 - in.window.j0)),
+      strides_{1, row_stride_, plane_stride_},
       fit_(fit),
+      by_widths_(by_widths),
       scratch_(scratch) {
   for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
   for (auto* rows : {&scratch.growth, &scratch.drift})
@@ -68,12 +71,52 @@ bool WindowLines::anyBlankAround(uint64_t j, uint64_t k) const {
   return false;
 }
 
+CellLengths WindowLines::cellsAlong(size_t axis, const std::array<uint64_t, 3>& ijk, ptrdiff_t at) const {
+  const NodePositions nodes{lattice_.x, lattice_.y, lattice_.z};
+  if (!by_widths_) return {nodes};
+  const std::array<uint64_t, 3> count{ni_, in_.block.nj, in_.block.nk};
+  const auto difference = [&](size_t other) {
+    const auto neighbour = [&](bool there, ptrdiff_t step) {
+      return there && !lattice_.blank[at + step] ? at + step : at;
+    };
+    return lattice_.position(neighbour(ijk[other] + 1 < count[other], strides_[other])) -
+           lattice_.position(neighbour(ijk[other] > 0, -strides_[other]));
+  };
+  return {nodes, glm::cross(difference((axis + 1) % 3), difference((axis + 2) % 3))};
+}
+
+namespace {
+
+constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
+
+}  // namespace
+
+WindowLines::InnerPart WindowLines::innerPart(size_t axis, uint64_t j, uint64_t k) const {
+  const auto is_inner = [](uint64_t index, uint64_t count, uint64_t reach) {
+    return index >= reach && index + reach < count;
+  };
+  const auto reach = [&](size_t along) -> uint64_t { return along == axis ? kWhole : by_widths_ ? 1 : 0; };
+  const uint64_t of_i = reach(0), of_j = reach(1), of_k = reach(2);
+  if (!is_inner(j, in_.block.nj, of_j) || !is_inner(k, in_.block.nk, of_k)) return {i1_, i1_, false};
+  InnerPart part{std::min(i1_, std::max(of_i, i0_)), 0, false};
+  part.last = std::max(part.first, std::min(ni_ - std::min(ni_, of_i), i1_));
+  for (uint64_t row_k = k - of_k; row_k <= k + of_k; ++row_k)
+    for (uint64_t row_j = j - of_j; row_j <= j + of_j; ++row_j)
+      part.any_blank |= (row_j == j || row_k == k) && hasBlank(row_j, row_k);
+  return part;
+}
+
+void WindowLines::markBlanksAlong(size_t axis, ptrdiff_t row, uint64_t first, uint64_t last) const {
+  clearMarks(first, last);
+  for (size_t along = 0; along < 3; ++along) {
+    const ptrdiff_t reach = along == axis ? static_cast<ptrdiff_t>(kWhole) : by_widths_ ? 1 : 0;
+    for (ptrdiff_t n = -reach; n <= reach; ++n) markBlanks(row + n * strides_[along], first, last);
+  }
+}
+
 void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
-  constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
-  const GridBlock& block = in_.block;
   const ptrdiff_t row = elementOfRow(j, k);
-  const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
-  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
+  const std::array<uint64_t, 3> count{ni_, in_.block.nj, in_.block.nk};
   for (size_t axis = 0; axis < 3; ++axis) {
     float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data(),
           *drift = scratch_.drift[axis].data();
@@ -81,12 +124,13 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
       for (uint64_t i = begin; i < end; ++i) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
         if (lattice_.blank[at]) continue;
-        const NodeOnLine node = onLine(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
-        const SquaredExtents extents =
-            extentsOnLine({lattice_.x, lattice_.y, lattice_.z}, at, node.stride, node.before, node.after);
+        const std::array<uint64_t, 3> ijk{i, j, k};
+        const NodeOnLine node = onLine(at, strides_[axis], ijk[axis], count[axis]);
+        const CellLengths cells = cellsAlong(axis, ijk, at);
+        const SquaredExtents extents = extentsOnLine(cells, at, node.stride, node.before, node.after);
         const bool has_two = node.before + node.after == 1;
         const Stretch stretch = has_two ? Stretch() : stretchOf(extents, fit_);
-        if (isAtJoint(node.index, node.count)) scratch_.lines[axis][i - i0_] = lineOf(node, extents);
+        if (isAtJoint(node.index, node.count)) scratch_.lines[axis][i - i0_] = lineOf(node, cells, extents);
         out[i - i0_] = stretch.factor;
         growth[i - i0_] = stretch.growth;
         drift[i - i0_] = stretch.drift;
@@ -94,29 +138,20 @@ void WindowLines::stretchRow(uint64_t j, uint64_t k) const {
     };
     const auto at_once = [&](uint64_t begin, uint64_t end) {
       if (begin >= end) return;
-      stretchNodes({lattice_.x, lattice_.y, lattice_.z}, row + static_cast<ptrdiff_t>(begin), strides[axis],
-                   end - begin, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)}, fit_);
+      NodeRow nodes{{lattice_.x, lattice_.y, lattice_.z},
+                    row + static_cast<ptrdiff_t>(begin),
+                    strides_[axis],
+                    end - begin};
+      if (by_widths_) nodes.across = {strides_[(axis + 1) % 3], strides_[(axis + 2) % 3]};
+      stretchNodes(nodes, {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)}, fit_);
     };
     // Nodes with neighbours in the block are done several at once, as far as none of these is blank.
-    uint64_t first = i0_, last = i1_;
-    bool any_blank = false;
-    if (axis == 0) {
-      first = std::min(i1_, std::max(kWhole, i0_));
-      last = std::max(first, std::min(ni_ - std::min(ni_, kWhole), i1_));
-      any_blank = hasBlank(j, k);
-    } else if (index[axis] >= kWhole && index[axis] + kWhole < count[axis]) {
-      for (uint64_t n = 0; n <= 2 * kWhole; ++n)
-        any_blank |= axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole);
-    } else {
-      first = last;
-    }
+    const auto [first, last, any_blank] = innerPart(axis, j, k);
     one_by_one(i0_, first);
     if (!any_blank) {
       at_once(first, last);
     } else {
-      clearMarks(first, last);
-      for (ptrdiff_t n = -static_cast<ptrdiff_t>(kWhole); n <= static_cast<ptrdiff_t>(kWhole); ++n)
-        markBlanks(row + n * strides[axis], first, last);
+      markBlanksAlong(axis, row, first, last);
       forEachRun(first, last, [&](uint64_t begin, uint64_t end, bool is_clear) {
         is_clear ? at_once(begin, end) : one_by_one(begin, end);
       });
@@ -138,15 +173,21 @@ WindowLines::NodeOnLine WindowLines::onLine(ptrdiff_t at, ptrdiff_t stride, uint
 }
 
 /// The line of a node; empty if the node has a neighbour on neither side, or on both sides of a face.
-JointLine WindowLines::lineOf(const NodeOnLine& node, const SquaredExtents& extents) const {
+JointLine WindowLines::lineOf(const NodeOnLine& node, const CellLengths& cells,
+                              const SquaredExtents& extents) const {
   const bool has_before = node.before > 0, has_after = node.after > 0;
   const bool is_half = isFace(node.index, node.count) && has_before != has_after;
   const int layer = layerOf(node.index, node.count);
   if (!is_half && !(layer != 0 && has_before && has_after)) return {};
   SquaredExtents row = extents;
   if (is_half ? has_before : layer < 0) std::reverse(row.begin(), row.end());
-  const double extent = glm::length(lattice_.position(node.at + (has_after ? node.stride : 0)) -
-                                    lattice_.position(node.at - (has_before ? node.stride : 0)));
+  const ptrdiff_t from = node.at - (has_before ? node.stride : 0),
+                  to = node.at + (has_after ? node.stride : 0);
+  const double extent = glm::length(lattice_.position(to) - lattice_.position(from));
+  if (const double width = cells.squared(from, to); width > 0 && by_widths_) {
+    // As long as the cells were if all were sheared as this node's: the splat's axis lies along the line.
+    for (double& squared : row) squared *= extent * extent / width;
+  }
   return JointLine::ofExtents(row, 0.5 * extent);
 }
 

@@ -20,8 +20,9 @@ inline bool isFace(uint64_t index, uint64_t count) {
 /// The lines and stretches of a window's rows. One thread at a time. `in` and the scratch outlive it.
 class WindowLines {
  public:
-  /// Sets the scratch to cells that are not stretched.
-  WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit fit, NodeScratch& scratch);
+  /// Sets the scratch to cells that are not stretched. `by_widths`: their lengths are CellLengths, else those along the lines.
+  WindowLines(const BlockWindow& in, const NodeBox& box, StretchFit fit, bool by_widths,
+              NodeScratch& scratch);
 
   const NodeLattice& lattice() const { return lattice_; }
   /// The element of node 0 of a row: negative where the window begins beyond it.
@@ -78,7 +79,17 @@ class WindowLines {
   bool isAtJoint(uint64_t index, uint64_t count) const {
     return isFace(index, count) || layerOf(index, count) != 0;
   }
-  JointLine lineOf(const NodeOnLine& node, const SquaredExtents& extents) const;
+  JointLine lineOf(const NodeOnLine& node, const CellLengths& cells, const SquaredExtents& extents) const;
+  /// The cells along an axis around node (i, j, k), at element `at`.
+  CellLengths cellsAlong(size_t axis, const std::array<uint64_t, 3>& ijk, ptrdiff_t at) const;
+  /// Which nodes of a row have all that stretchNodes() needs of the block: those from `first` to `last` - 1, if no blank node is near.
+  struct InnerPart {
+    uint64_t first, last;
+    bool any_blank;
+  };
+  InnerPart innerPart(size_t axis, uint64_t j, uint64_t k) const;
+  /// Marks the nodes for which one of those that stretchNodes() needs is blank.
+  void markBlanksAlong(size_t axis, ptrdiff_t row, uint64_t first, uint64_t last) const;
   NodeOnLine onLine(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
 
   const BlockWindow& in_;
@@ -86,7 +97,9 @@ class WindowLines {
   const NodeLattice lattice_;
   uint64_t ni_, i0_, i1_;  // of a row; its part
   ptrdiff_t row_stride_, plane_stride_;
+  const std::array<ptrdiff_t, 3> strides_;
   const StretchFit fit_;
+  const bool by_widths_;
   NodeScratch& scratch_;
 };
 

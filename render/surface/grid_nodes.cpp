@@ -109,7 +109,7 @@ uint64_t joinedNodes(const Manifest& manifest) {
 }  // namespace
 
 bool GridNodes::canBeOf(const Manifest& manifest) {
-  if (manifest.cells || manifest.stretch != kDualCells || manifest.overlap == kOverlapOwner) return false;
+  if (manifest.cells || !manifest.hasDualCells() || manifest.overlap == kOverlapOwner) return false;
   if (manifest.nodes > kMaxNodes || manifest.blanked_nodes > manifest.nodes) return false;
   if (manifest.splats > manifest.nodes - manifest.blanked_nodes) return false;
   uint64_t nodes = 0;

@@ -100,6 +100,9 @@ inline constexpr const char* kSteepStretch = "steep";  // by StretchFit::kSteep 
 /// Steep as well, and splats weigh as much as their dual cells (preprocess/splats/dual_cell.h), collapsed
 /// ones have their shape, and rows go on across joints (preprocess/seams/joined_rows.h).
 inline constexpr const char* kDualCells = "dual-cells";
+/// Dual cells as well, and splats are fitted to how long cells are across their faces (CellLengths in
+/// preprocess/splats/stretch.h), no longer to lengths of grid lines.
+inline constexpr const char* kCellWidths = "cell-widths";
 /// Splats of a mesh's points are fitted where nodes hang (preprocess/moments/mesh_splats.h).
 inline constexpr const char* kHangingNodes = "hanging-nodes";
 
@@ -125,8 +128,9 @@ struct Manifest {
   /// is not known.
   std::string overlap;
   std::string
-      stretch;  // how splats are made where cells grow: kDualCells, kSteepStretch, kHangingNodes; empty: by StretchFit::kGentle
-  bool isSteep() const { return stretch == kSteepStretch || stretch == kDualCells; }
+      stretch;  // how splats are made where cells grow: kCellWidths, kDualCells, ...; empty: by StretchFit::kGentle
+  bool hasDualCells() const { return stretch == kDualCells || stretch == kCellWidths; }
+  bool isSteep() const { return stretch == kSteepStretch || hasDualCells(); }
   std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
                                           // their geometry (preprocess/survey/grid_survey.h)
   std::string time_unit;       // of the steps' times, such as "days since 1900-01-01"; may be empty

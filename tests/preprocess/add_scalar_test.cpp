@@ -246,7 +246,7 @@ TEST(AddScalar, StretchesCellsThatGrowAsTheCacheDoes) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "a.splats";
   convertTo(cache, source, {0});
-  ASSERT_EQ(CacheReader(cache).manifest().stretch, kDualCells);
+  ASSERT_EQ(CacheReader(cache).manifest().stretch, kCellWidths);
   added(source, adding(cache, {1}));
   const Files files = allFilesOf(cache);
   EXPECT_TRUE(files.at("var.0.bin") == files.at("var.1.bin"));

@@ -225,6 +225,23 @@ TEST(NodeSplats, WeighAsMuchAsTheGrid) {
   }
 }
 
+TEST(NodeSplats, OfSteepTerrainLieInTheirColumns) {
+  // Layers of 0.5 over hills: grid lines along i and j are up to four times as long as others, and all cells have one volume. Fitted
+  // to the lines' lengths, splats moved aside by a fifth of a cell, and an even medium looked mottled from above: by 10 %.
+  MappedBlock grid(14, 13, 12, [](double i, double j, double k) {
+    return glm::dvec3(i, j, 4 * std::sin(0.9 * i) * std::cos(0.8 * j) + 0.5 * k);
+  });
+  const NodeSplats out = grid.splats();
+  for (uint64_t k = 3; k < 9; ++k)
+    for (uint64_t j = 3; j < 10; ++j)
+      for (uint64_t i = 3; i < 11; ++i) {
+        const Splat& splat = out.splats[grid.at(i, j, k)].splat;
+        EXPECT_NEAR(splat.position.x, static_cast<double>(i), 1e-9);
+        EXPECT_NEAR(splat.position.y, static_cast<double>(j), 1e-9);
+        EXPECT_NEAR(splat.axis[0] * splat.axis[1] * splat.axis[2], 0.5, 1e-9);
+      }
+}
+
 TEST(NodeSplats, OfThinLayersThatBendKeepTheirValues) {
   // Layers of 1 km on a sphere, 5 degrees apart: they bend by 24 of their cells along either axis.
   MappedBlock grid(9, 9, 9, [](double i, double j, double k) {
@@ -319,7 +336,7 @@ JointLine lineOfSteps(const std::array<double, 6>& steps, bool at_face) {
   const std::array<double, 7> zero{};
   const NodePositions nodes{x.data(), zero.data(), zero.data()};
   const int before = at_face ? 0 : 1;
-  return JointLine::ofExtents(extentsOnLine(nodes, before, 1, before, kStretchReach),
+  return JointLine::ofExtents(extentsOnLine({nodes}, before, 1, before, kStretchReach),
                               at_face ? 0.5 * steps[0] : 0.5 * (steps[0] + steps[1]));
 }
 

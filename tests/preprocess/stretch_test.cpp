@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -28,7 +29,7 @@ struct Line {
 
   NodePositions nodes() const { return {x.data(), zero.data(), zero.data()}; }
   Stretch at(size_t n, StretchFit fit = StretchFit::kSteep) const {
-    return stretchOf(extentsOnLine(nodes(), static_cast<ptrdiff_t>(n), 1, static_cast<int>(n),
+    return stretchOf(extentsOnLine({nodes()}, static_cast<ptrdiff_t>(n), 1, static_cast<int>(n),
                                    static_cast<int>(x.size() - 1 - n)),
                      fit);
   }
@@ -224,12 +225,12 @@ void expectOneRow(double factor) {
     const ptrdiff_t first = 3 * stride;
     const size_t count = x.size() - static_cast<size_t>(6 * stride);
     std::vector<float> row(count), growth(count), drift(count);
-    stretchNodes(nodes, first, stride, count, {row.data(), growth.data(), drift.data()});
+    stretchNodes({nodes, first, stride, count}, {row.data(), growth.data(), drift.data()});
     for (size_t n = 0; n < count; ++n) {
       const ptrdiff_t at = first + static_cast<ptrdiff_t>(n);
       const auto before = static_cast<int>(at / stride),
                  after = static_cast<int>((static_cast<ptrdiff_t>(x.size()) - 1 - at) / stride);
-      const Stretch alone = stretchOf(extentsOnLine(nodes, at, stride, before, after));
+      const Stretch alone = stretchOf(extentsOnLine({nodes}, at, stride, before, after));
       EXPECT_EQ(row[n], alone.factor) << stride << " " << n;
       EXPECT_EQ(growth[n], alone.growth) << stride << " " << n;
       EXPECT_EQ(drift[n], alone.drift) << stride << " " << n;
@@ -239,6 +240,59 @@ void expectOneRow(double factor) {
 
 TEST(Stretch, OfARowIsThatOfItsNodes) {
   for (const double factor : {1.0, 1.4, 1.8, 2.5}) expectOneRow(factor);
+}
+
+TEST(Stretch, OfARowIsThatOfItsNodesAcrossFaces) {
+  constexpr ptrdiff_t kRow = 90, kPlane = kRow * 12;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> jitter(-0.3, 0.3);
+  std::array<std::vector<double>, 3> x;
+  for (ptrdiff_t n = 0; n < 12 * kPlane; ++n)
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const ptrdiff_t index[] = {n % kRow, n / kRow % 12, n / kPlane};
+      x[axis].push_back(static_cast<double>(index[axis]) + jitter(random));
+    }
+  const std::array<ptrdiff_t, 3> strides{1, kRow, kPlane};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    const ptrdiff_t p = strides[(axis + 1) % 3], q = strides[(axis + 2) % 3];
+    const NodePositions nodes{x[0].data(), x[1].data(), x[2].data()};
+    constexpr ptrdiff_t kFirst = 5 + 5 * kRow + 5 * kPlane;
+    constexpr size_t kCount = 80;
+    std::vector<float> row(kCount), growth(kCount), drift(kCount);
+    stretchNodes({nodes, kFirst, strides[axis], kCount, {p, q}}, {row.data(), growth.data(), drift.data()});
+    for (size_t n = 0; n < kCount; ++n) {
+      const ptrdiff_t at = kFirst + static_cast<ptrdiff_t>(n);
+      const auto position = [&](ptrdiff_t node) {
+        const auto element = static_cast<size_t>(node);
+        return glm::dvec3(x[0][element], x[1][element], x[2][element]);
+      };
+      const auto difference = [&](ptrdiff_t step) { return position(at + step) - position(at - step); };
+      const CellLengths cells{nodes, glm::cross(difference(p), difference(q))};
+      const Stretch alone = stretchOf(extentsOnLine(cells, at, strides[axis], kStretchReach, kStretchReach));
+      EXPECT_EQ(row[n], alone.factor) << axis << " " << n;
+      EXPECT_EQ(growth[n], alone.growth) << axis << " " << n;
+      EXPECT_EQ(drift[n], alone.drift) << axis << " " << n;
+    }
+  }
+}
+
+TEST(Stretch, OfShearedCellsDependsOnTheirWidths) {
+  // Columns 1, 2, 4, ... wide over ground that rises and falls: x and z of nodes; y is across.
+  std::vector<double> x, y, z;
+  for (int j = -1; j < 2; ++j)
+    for (int k = -1; k < 2; ++k)
+      for (int i = 0; i < 9; ++i) {
+        x.push_back(std::exp2(i));
+        y.push_back(j);
+        z.push_back(k + 5 * std::sin(2.0 * i));
+      }
+  constexpr ptrdiff_t kMiddle = 4 + 4 * 9;
+  const NodePositions nodes{x.data(), y.data(), z.data()};
+  const Stretch found =
+      stretchOf(extentsOnLine({nodes, {2, 0, 0}}, kMiddle, 1, kStretchReach, kStretchReach));
+  const Line flat(std::vector<double>(x.begin(), x.begin() + 9));
+  EXPECT_NEAR(found.factor, flat.stretch(4), 1e-6);
+  EXPECT_NEAR(found.growth, std::numbers::ln2, 0.1);
 }
 
 TEST(Stretch, IsBoundedAndOneWhereThereIsNothingToBlend) {
