@@ -13,6 +13,7 @@
 #include "stream/cache/cache_verify.h"
 #include "tests/series/step_series.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/thread_ranks.h"
 
@@ -102,6 +103,7 @@ TEST(OwnBlanksSeries, AddsStepsResumesAndTakesUpAKilledAddition) {
   convertSets({}, folder / "all.splats");
   const auto wanted = allFilesOf(folder / "all.splats");
   for (const size_t before : {2u, 3u}) {
+    if (before == 2 && !faults::isWholeSweep()) continue;  // added: StepsAreAddedToACacheOfOne
     SCOPED_TRACE(before);
     const fs::path cache = folder / "more.splats", more = folder / "one_more.splats";
     fs::remove_all(cache);
@@ -158,6 +160,7 @@ TEST(OwnBlanksSeries, ASetEndsWhereItHasNoValuesOrIsMissing) {
 TEST(OwnBlanksSeries, RanksAndPartsMakeTheSameBytes) {
   for (const Parts& parts : {Parts{8, 99, 7, 99}, Parts{8, 7, 99, 99}, Parts{8, 99, 3, 99}}) {
     SCOPED_TRACE(parts.changes);
+    if (parts.none == 7 && !faults::isWholeSweep()) continue;
     const TemporaryFolder folder;
     convertSets(parts, folder / "one.splats");
     const auto wanted = allFilesOf(folder / "one.splats");

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "stream/cache/cache_reader.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 
 namespace curvisplat {
@@ -52,6 +53,7 @@ TEST_F(SeriesCommand, EachStepDrawsAsACacheOfThatStepAlone) {
     draw(name + ".splats", "frame_%d.png", {"--steps", "all"});
     for (int step = 0; step < 3; ++step) {
       SCOPED_TRACE(step);
+      if (step != (moving ? 1 : 2) && !faults::isWholeSweep()) continue;
       const std::string number = fmt::format("{:04}", step);
       const std::string own_grid = moving ? file(name + "_" + number + ".xyz") : file(name + ".xyz");
       fs::remove_all(file("alone.splats"));
@@ -158,7 +160,10 @@ TEST_F(SeriesCommand, AnInterruptedAdditionGoesOnWhereItStood) {
   };
   const Files expected = resumed(0);
   EXPECT_EQ(CacheReader(file("to.splats")).series().steps.size(), 5u);
-  for (int added_before = 1; added_before < 4; ++added_before) EXPECT_TRUE(resumed(added_before) == expected);
+  for (int added_before = 1; added_before < 4; ++added_before)
+    if (added_before == 2 || faults::isWholeSweep()) {
+      EXPECT_TRUE(resumed(added_before) == expected) << added_before;
+    }
 }
 
 TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {

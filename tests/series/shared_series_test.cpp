@@ -43,15 +43,14 @@ Conversion convertBy(unsigned count, const SeriesInput& input, const SeriesOptio
 
 /// A grid that stays, one that moves at each step, one that moves now and then and comes back, and one that leaves for a
 /// step, so that groups begin elsewhere after it.
-const std::vector<StepKind> kSteady = steadyGrid(13), kMoving{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {4, 4}},
+const std::vector<StepKind> kSteady = steadyGrid(10), kMoving{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {4, 4}},
                             kNowAndThen{{0},      {1},    {2, 0.5}, {3, 0.5}, {4, 0.5}, {5, 0.5},
                                         {6, 0.5}, {7, 1}, {8},      {9},      {10}},
                             kOnceAway{{0}, {1}, {2, 0.5}, {3}, {4}, {5}, {6}};
 
 TEST(SharedSeries, HasTheBytesOfOneProcess) {
-  // 16 ranks are more than there are groups.
-  const auto of_steady =
-      faults::isWholeSweep() ? std::vector<unsigned>{2, 7, 16} : std::vector<unsigned>{2, 16};
+  // 7 ranks are more than there are groups.
+  const auto of_steady = faults::isWholeSweep() ? std::vector<unsigned>{2, 7, 16} : std::vector<unsigned>{7};
   const auto of_others = faults::isWholeSweep() ? std::vector<unsigned>{2, 4} : std::vector<unsigned>{4};
   const std::pair<std::vector<StepKind>, std::vector<unsigned>> cases[] = {
       {kSteady, of_steady}, {kMoving, {3}}, {kNowAndThen, of_others}, {kOnceAway, {2}}};
@@ -77,6 +76,7 @@ TEST(SharedSeries, AddsStepsAndResumes) {
   convertQuietly(inputOf(kSteady), optionsFor(folder / "one.splats"));
   const auto wanted = allFilesOf(folder / "one.splats");
   for (const size_t before : {1u, 2u, 6u}) {
+    if (before == 2 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(before);
     const fs::path cache = folder / "more.splats";
     fs::remove_all(cache);
@@ -175,6 +175,7 @@ TEST(SharedSeries, CanBeInterruptedInAnyRound) {
   convertQuietly(inputOf(kSteady), optionsFor(folder / "one.splats"));
   const auto wanted = allFilesOf(folder / "one.splats");
   for (const uint64_t stop : {1u, 5u}) {
+    if (stop == 1 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(stop);
     const fs::path cache = folder / "stopped.splats";
     SeriesInput interrupted = inputOf(kSteady);
@@ -223,13 +224,14 @@ TEST(SharedSeries, NamesTheFolderOfTheOutputIfTheDiskIsFull) {
   SeriesOptions options = optionsFor(folder / "a.splats");
   options.convert.overwrite = true;
   for (const unsigned ranks : {1u, 3u})
-    expectGivenFoldersOnFullDisks(folder.path(), faults::isWholeSweep() ? 29 : 67,
+    expectGivenFoldersOnFullDisks(folder.path(), faults::isWholeSweep() ? 29 : 113,
                                   [&] { convertBy(ranks, inputOf(kMoving), options); });
 }
 
 TEST(SharedSeries, RemovesOnlyItsOwnTemporaryFiles) {
   const TemporaryFolder folder;
-  convertQuietly(inputOf(kSteady), optionsFor(folder / "one.splats"));
+  const std::vector<StepKind> kinds = steadyGrid(5);
+  convertQuietly(inputOf(kinds), optionsFor(folder / "one.splats"));
   fs::create_directory(folder / "other");
   const fs::path cache = folder / "w.splats";
   const fs::path others[] = {folder / "w.splats.ranks_old", folder / "w.splats.rank1.77.0",
@@ -240,7 +242,7 @@ TEST(SharedSeries, RemovesOnlyItsOwnTemporaryFiles) {
   fs::create_directory(abandoned);
   SeriesOptions options = optionsFor(cache);
   options.convert.temporary_folder = folder.path();  // the output's folder
-  convertBy(3, inputOf(kSteady), options);
+  convertBy(3, inputOf(kinds), options);
   EXPECT_TRUE(allFilesOf(cache) == allFilesOf(folder / "one.splats"));
   for (const fs::path& path : others) EXPECT_TRUE(fs::exists(path)) << path;
   EXPECT_FALSE(fs::exists(abandoned));
@@ -287,6 +289,7 @@ TEST(SeriesParts, AreJoinedToTheBytesOfOneProcess) {
     convertQuietly(inputOf(kinds), optionsFor(folder / "one.splats"));
     const auto wanted = allFilesOf(folder / "one.splats");
     for (const uint64_t count : {1u, 3u, 16u}) {
+      if ((count == 3) != (kinds.size() == kSteady.size()) && !faults::isWholeSweep()) continue;
       SCOPED_TRACE(fmt::format("{} steps, {} parts", kinds.size(), count));
       const fs::path output = folder / "joined.splats";
       for (uint64_t index = count; index-- > 0;) convertPart(output, kinds, {index, count});
