@@ -93,7 +93,7 @@ void expectAsAtOnce(const GridSource& source) {
     std::optional<uint64_t> bucket_splats;
     std::optional<uint32_t> most_buckets;
   };
-  // Usually each value once.
+  // Usually one for each grid, by turns, with each value once.
   std::vector<Way> ways{{"plain", 2, uint64_t{1} << 30, {}, {}},
                         {"one thread, the least memory, small buckets", 1, leastMemory(2), 20000, {}},
                         {"tiny buckets, divided twice", 2, uint64_t{1} << 30, 500, 3}};
@@ -101,6 +101,8 @@ void expectAsAtOnce(const GridSource& source) {
     ways.insert(ways.end(), {{"one thread", 1, uint64_t{1} << 30, {}, {}},
                              {"the least memory", 2, leastMemory(2), {}, {}},
                              {"small buckets", 2, uint64_t{1} << 30, 20000, {}}});
+  static size_t usual = 0;
+  if (!faults::isWholeSweep()) ways = {ways[usual++ % ways.size()]};
   for (const Way& way : ways) {
     const fs::path cache = folder / "added.splats";
     fs::copy(folder / "first.splats", cache);

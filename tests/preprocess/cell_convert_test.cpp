@@ -69,7 +69,7 @@ TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
 
 TEST(CellConvert, HasTheSameBytesForAnyThreadsAndMemory) {
   const TemporaryFolder folder;
-  const SceneGridSource nodes(makeScene("half-annulus"), {90, 90, 60});
+  const SceneGridSource nodes(makeScene("half-annulus"), {60, 50, 40});
   Rearrangement blocks;
   blocks.cuts = {2, 1, 3};
   const RearrangedGridSource cut(nodes, blocks);

@@ -202,7 +202,7 @@ TEST(RefinedSource, ReadsLargeBoxesByPlanes) {
   const std::array<uint32_t, 1> scalar{0};
   const Refinement cut(std::vector<CellCuts>{{1, 1, 3}});
   for (const Centring centring : {Centring::kNode, Centring::kCell}) {
-    const auto fine = refined(gridWithGone({250, 200, 7}, 77, Gone::kBlanked, centring), cut);
+    const auto fine = refined(gridWithGone({150, 130, 7}, 77, Gone::kBlanked, centring), cut);
     const GridBlock& block = fine->description().blocks[0];
     const NodeArrays whole = allNodes(*fine, 0);
     ASSERT_EQ(whole.x.size(), block.nodes());

@@ -118,10 +118,10 @@ class ResumeScatter : public ::testing::Test {
   void expectTheSameAfterInterruptions(const GridSource& source) {
     const int64_t writes = convertWhole(source);
     // The splats are scattered in the first quarter of the writes. How many of those fall within it depends on the
-    // threads, so that every fifth may be too few: then the others follow.
+    // threads, so that every eleventh may be too few: then the others follow.
     const bool is_whole = faults::isWholeSweep();
     const int64_t last = is_whole ? writes / 2 : writes / 4;
-    const int stride = is_whole ? 1 : 5;
+    const int stride = is_whole ? 1 : 11;
     int within = 0;
     for (int first = 0; first < stride && within < 3; ++first)
       for (int64_t at = first; at < last; at += stride) {

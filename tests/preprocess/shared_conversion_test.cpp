@@ -58,14 +58,14 @@ TEST_F(SharedConversion, HasTheBytesOfOneProcess) {
 
 TEST_F(SharedConversion, HasTheBytesWithBucketsOfAnySize) {
   const SceneGridSource source(makeScene("half-annulus"), {60, 40, 30});
-  expectSameBytes(source, {2});
+  if (faults::isWholeSweep()) expectSameBytes(source, {2});
   expectSameBytes(source, {3}, 1000);
 }
 
 /// Two abutting blocks with a common face, and one apart; some nodes blanked.
-FunctionGridSource blocksWithSeams(Centring centring = Centring::kNode) {
+FunctionGridSource blocksWithSeams(Centring centring = Centring::kNode, uint64_t nk = 24) {
   return FunctionGridSource(
-      {gridBlock(40, 40, 24), gridBlock(30, 40, 24), gridBlock(9, 8, 7)}, 2,
+      {gridBlock(40, 40, nk), gridBlock(30, 40, nk), gridBlock(9, 8, 7)}, 2,
       [=](const GridNode& node) {
         const auto x = static_cast<double>(node.i) + (node.block == 0 ? 0 : node.block == 1 ? 39 : 200);
         const auto y = static_cast<double>(node.j), z = static_cast<double>(node.k);
@@ -84,7 +84,7 @@ TEST_F(SharedConversion, HasTheBytesWithSeamsBlanksAndSeveralScalars) {
 }
 
 TEST_F(SharedConversion, HasTheBytesOfCells) {
-  expectSameBytes(blocksWithSeams(Centring::kCell), {3}, 4000);
+  expectSameBytes(blocksWithSeams(Centring::kCell, 10), {3}, 4000);
 }
 
 TEST_F(SharedConversion, HasTheBytesWhereRanksHaveNothingToDo) {
@@ -116,7 +116,7 @@ TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
   const Files expected = allFilesOf(options.output);
   fs::remove_all(options.output);
   for (const auto& [first, second] : {std::pair{3u, 1u}, {3u, 2u}, {1u, 3u}, {2u, 4u}}) {
-    if (first + second != 4 && !faults::isWholeSweep()) continue;
+    if ((first != 3 || second != 2) && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(fmt::format("{}, then {}", first, second));
     options.output = folder_ / "again.splats";
     options.limits.bucket_splats = 3000;

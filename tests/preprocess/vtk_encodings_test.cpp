@@ -12,6 +12,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/grid_nodes.h"
 #include "tests/support/vts_writer.h"
 
@@ -150,8 +151,10 @@ TEST(VtkEncodings, AllGiveTheSameCache) {
   const TestFolder folder("vts-caches");
   const VtsGrid grid = annulusVtsGrid(20, 15, 12);
   std::map<std::string, uint64_t> first;
+  size_t number = 0;
   for (const VtsEncoding& encoding : allVtsEncodings()) {
     if (encoding.header_bytes == 8 && !encoding.big_endian) continue;
+    if (!faults::isTried(number++, 7)) continue;  // AllHoldTheSameValues has all of them
     SCOPED_TRACE(encoding.describe());
     const auto checksums = checksumsOf(*openText(folder, vtsFile(grid, encoding)), {"p", "U:mag"},
                                        folder.path() / "grid.splats");
@@ -184,6 +187,7 @@ TEST(VtkEncodings, FacesOfAnOceanGiveTheSameCacheInEachEncoding) {
     grid.cell_data = {{"T", "Float32", 1, {cells.begin(), cells.end()}}};
     const auto expected = checksumsOf(*source, {"T"}, folder.path() / "grid.splats");
     EXPECT_GE(expected.size(), 4u);
+    size_t number = name[4] - '0';  // 1 and 6: usually others of either file
     for (const VtsEncoding& encoding :
          {VtsEncoding{Format::kAscii}, VtsEncoding{Format::kInlineBase64, Compressor::kZlib},
           VtsEncoding{Format::kAppendedRaw, Compressor::kNone, 4, true},
@@ -191,6 +195,7 @@ TEST(VtkEncodings, FacesOfAnOceanGiveTheSameCacheInEachEncoding) {
           VtsEncoding{Format::kAppendedRaw, Compressor::kZlib},
           VtsEncoding{Format::kAppendedRaw, Compressor::kLz4, 8},
           VtsEncoding{Format::kInlineBase64, Compressor::kLzma}}) {
+      if (!faults::isTried(number++, 4)) continue;
       SCOPED_TRACE(encoding.describe());
       const auto again = openText(folder, vtsFile(grid, encoding));
       EXPECT_EQ(checksumsOf(*again, {"T"}, folder.path() / "grid.splats"), expected);
