@@ -6,6 +6,7 @@ with the arrays, and the volume that `curvisplat convert` writes with VTK's own.
 (skipped) without python3-vtk9.
 """
 import gzip
+import itertools
 import json
 import pathlib
 import re
@@ -35,12 +36,13 @@ class MeshFiles(MeshCase):
     def test_every_encoding_of_xml(self):
         grid = cube(3)
         path = self.folder / "mesh.vtu"
-        for mode, raw in (("Ascii", True), ("Binary", True), ("Appended", True), ("Appended", False)):
-            for compressor in ("None", "ZLib", "LZ4", "LZMA"):
-                for order, header in (("LittleEndian", "UInt32"), ("BigEndian", "UInt64")):
-                    with self.subTest(mode=mode, raw=raw, compressor=compressor, order=order):
-                        write_xml(grid, path, mode, compressor, raw=raw, order=order, header=header)
-                        self.check(path, grid)
+        modes = ("Ascii", True), ("Binary", True), ("Appended", True), ("Appended", False)
+        orders = ("LittleEndian", "UInt32"), ("BigEndian", "UInt64")
+        # Usually each once at least: structured grids are decoded by the same code (VtkEncodings).
+        for (mode, raw), compressor, (order, header) in some_of(itertools.product(modes, ("None", "ZLib", "LZ4", "LZMA"), orders), 3):
+            with self.subTest(mode=mode, raw=raw, compressor=compressor, order=order):
+                write_xml(grid, path, mode, compressor, raw=raw, order=order, header=header)
+                self.check(path, grid)
 
     def test_base64_of_one_value(self):
         """VTK's own writer: the types of one cell are 4 bytes of header and one of data, "AQAAAAw="."""
@@ -68,7 +70,7 @@ class MeshFiles(MeshCase):
             for compressor in ("None", "ZLib"):
                 write_xml(grid, path, "Binary", compressor, header=header)
                 text = path.read_text()
-                for length, end in ((76, "\n"), (64, "\r\n"), (76, "\n      "), (1000, "\n")):
+                for length, end in some_of(((76, "\n"), (64, "\r\n"), (76, "\n      "), (1000, "\n")), 2, turn=compressor == "ZLib"):
                     # MIME's lines run through; others break the line behind the header, too.
                     for apart in (False, True):
                         def broken(found):
