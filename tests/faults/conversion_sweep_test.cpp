@@ -89,9 +89,9 @@ TEST_F(ConversionSweep, ALargerOneIsWholeOrNothing) {
   ASSERT_GT(CacheReader(output_).manifest().levels, 1u);
   faults::FaultSweep conversion = converting({}), addition = adding();
   conversion.stride = addition.stride = 463;
-  EXPECT_GE(conversion.run(faults::kFailsOnce), 13);
-  ASSERT_FALSE(HasFailure());
-  EXPECT_GE(addition.run(faults::kFailsOnce), 12);
+  EXPECT_GE(conversion.run(faults::kFailsOnce), 7);
+  if (HasFailure() || !faults::isWholeSweep()) return;  // usually AnAdditionIsThereOrNot alone has additions
+  EXPECT_GE(addition.run(faults::kFailsOnce), 7);
 }
 
 TEST_F(ConversionSweep, ShortInterruptedAndSlowTransfersChangeNothing) {
@@ -243,11 +243,12 @@ class MeshSweep : public ConversionSweep {
 };
 
 TEST_F(MeshSweep, AConversionIsWholeOrNothing) {
-  for (const char* const scalar : {"f", "c"}) {
-    setUpFrom(scalar);
+  for (const int job : {0, 1}) {
+    setUpFrom(job == 0 ? "f" : "c");
     ASSERT_EQ(namelessFiles(), 0);
-    for (const Fault& fault : kFaults) {
-      EXPECT_GE(converting({}).run(fault), 4) << scalar << ": " << fault.name;
+    for (size_t n = 0; n < std::size(kFaults); ++n) {
+      if (!isTriedWith(job, n)) continue;
+      EXPECT_GE(converting({}).run(kFaults[n]), 4) << job << ": " << kFaults[n].name;
       if (HasFailure()) return;
     }
   }
@@ -256,12 +257,14 @@ TEST_F(MeshSweep, AConversionIsWholeOrNothing) {
 /// Positions, sums of points, and faces of cells that wait for the cell on their other side.
 TEST_F(MeshSweep, WhatWaitsOnDiskIsWholeOrNothing) {
   mesh_bytes_ = 100'000;
-  for (const auto& [scalar, files] : {std::pair("f", 5), std::pair("c", 7)}) {
-    setUpFrom(scalar);
-    ASSERT_GE(namelessFiles(), files);
-    for (const Fault& fault :
-         {faults::kFailsOnce, faults::kFailsFromThenOn, faults::kIsFull, faults::kHasNoNames}) {
-      EXPECT_GE(converting({}).run(fault), 10) << scalar << ": " << fault.name;
+  for (const int job : {0, 1}) {
+    setUpFrom(job == 0 ? "f" : "c");
+    ASSERT_GE(namelessFiles(), job == 0 ? 5 : 7);
+    const Fault tried[] = {faults::kFailsOnce, faults::kFailsFromThenOn, faults::kHasNoNames,
+                           faults::kIsFull};
+    for (size_t n = 0; n < std::size(tried); ++n) {
+      if (!isTriedWith(job, n)) continue;
+      EXPECT_GE(converting({}).run(tried[n]), 7) << job << ": " << tried[n].name;
       if (HasFailure()) return;
     }
   }
@@ -273,16 +276,17 @@ TEST_F(MeshSweep, GradientsAreWholeOrNothing) {
   setUpFrom("vorticity_magnitude");
   ASSERT_GE(namelessFiles(), 2);
   for (const Fault& fault : {faults::kFailsOnce, faults::kIsFull}) {
-    EXPECT_GE(converting({}).run(fault), 10) << fault.name;
+    EXPECT_GE(converting({}).run(fault), 7) << fault.name;
     if (HasFailure()) return;
   }
 }
 
 TEST_F(MeshSweep, AnAdditionIsThereOrNot) {
-  for (const char* const scalar : {"f", "c"}) {
-    setUpFrom(scalar);
-    for (const Fault& fault : kFaults) {
-      EXPECT_GE(adding().run(fault), 2) << scalar << ": " << fault.name;
+  for (const int job : {0, 1}) {
+    setUpFrom(job == 0 ? "f" : "c");
+    for (size_t n = 0; n < std::size(kFaults); ++n) {
+      if (!isTriedWith(job, n)) continue;
+      EXPECT_GE(adding().run(kFaults[n]), 2) << job << ": " << kFaults[n].name;
       if (HasFailure()) return;
     }
   }

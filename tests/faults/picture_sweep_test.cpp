@@ -98,7 +98,7 @@ TEST_F(RenderSweep, KeepGoingIsForDamageNotForAFailingDisk) {
       check(outcome);
       EXPECT_TRUE(!outcome.error.empty() || statistics_.bricks_unreadable.empty());
     };
-    EXPECT_GE(sweep.run(fault), 10) << fault.name;
+    EXPECT_GE(sweep.run(fault), 7) << fault.name;
     if (HasFailure()) return;
   }
   int64_t stood_in_for = 0;
@@ -233,7 +233,7 @@ TEST_F(ExportSweep, AFileIsRightOrNotThere) {
           << file << ": " << fault.name;
       if (HasFailure()) return;
     }
-    EXPECT_GE(writing(job, expected, {}).run(faults::kFailsOnce), 10) << file;
+    EXPECT_GE(writing(job, expected, {}).run(faults::kFailsOnce), 7) << file;
     if (HasFailure()) return;
   }
 }

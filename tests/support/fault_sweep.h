@@ -65,12 +65,12 @@ struct FaultSweep {
   std::string to_be_cut;   // only files whose paths begin so become shorter
   std::function<void()> prepare, job;
   std::function<void(const FaultOutcome&)> check;
-  int64_t stride = 11;  // of nextInSweep()
+  int64_t stride = 11;
 
-  /// Calls prepare(), job() with the fault at the n-th call, and check(outcome), for n from 0 on as
-  /// nextInSweep() says, until the fault is not reached any more. Expects that a failing job throws an Error of one line that
-  /// names a path and the reason, and no temporary file where the disk is full, and that no descriptor is lost. Returns how
-  /// many faults were tried.
+  /// Calls prepare(), job() with the fault at the n-th call, and check(outcome), for the first n and one in `stride` of
+  /// the others, or with tools/test.sh --whole for all n, until the fault is not reached any more. Expects that a failing
+  /// job throws an Error of one line that names a path and the reason, and no temporary file where the disk is full, and
+  /// that no descriptor is lost. Returns how many faults were tried.
   int64_t run(const Fault& fault) const;
 };
 
