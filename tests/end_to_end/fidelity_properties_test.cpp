@@ -90,7 +90,9 @@ TEST_F(FidelityProperties, OrderAndDirectionOfTheAxesDoNotMatter) {
                                   {{0, 1, 2}, {true, false, false}},
                                   {{0, 1, 2}, {false, true, true}},
                                   {{2, 0, 1}, {true, true, true}}};
-  for (const Rearrangement& how : others) {
+  for (size_t n = 0; n < std::size(others); ++n) {
+    const Rearrangement& how = others[n];
+    if (n != 2 && n != 4 && !faults::isWholeSweep()) continue;
     const Image other = draw(RearrangedGridSource(source, how), halfAnnulusCamera(), "band", kSize);
     EXPECT_GE(compareImages(plain, other).psnr_db, 60) << how.axes[0] << how.axes[1] << how.axes[2];
   }
@@ -99,7 +101,8 @@ TEST_F(FidelityProperties, OrderAndDirectionOfTheAxesDoNotMatter) {
 TEST_F(FidelityProperties, BlocksThatAbutLookLikeOne) {
   constexpr ImageSize kSize{256, 256};
   const SceneGridSource source = halfAnnulus({128, 64, 64});
-  const std::string functions[] = {"smooth", "band", "step"};
+  std::vector<std::string> functions{"step"};
+  if (faults::isWholeSweep()) functions.insert(functions.end(), {"smooth", "band"});
   const auto drawn = [&](const std::filesystem::path& cache, const std::string& function) {
     return drawCache(cache, KnownFunction::of(function).table, halfAnnulusCamera(), knownFrame(kSize));
   };
@@ -115,7 +118,7 @@ TEST_F(FidelityProperties, BlocksThatAbutLookLikeOne) {
     how.cuts = cuts;
     const RearrangedGridSource blocks(source, how);
     convertGrid(blocks, folder_ / "grid.splats");
-    for (size_t n = 0; n < 3; ++n) {
+    for (size_t n = 0; n < functions.size(); ++n) {
       const ImageDifference difference =
           compareImages(uncut[n], drawn(folder_ / "grid.splats", functions[n]));
       fmt::print("{} blocks, {}: {:.1f} dB, {:.2f}/255\n", cuts[0] * cuts[1] * cuts[2], functions[n],
@@ -195,7 +198,7 @@ TEST_F(FidelityProperties, PerspectiveIsAsGoodAsOrthographic) {
   const auto scene = makeScene("half-annulus");
   for (const auto& [function, angle] : std::vector<std::pair<std::string, double>>{
            {"smooth", 30}, {"band", 30}, {"step", 30}, {"band", 90}}) {
-    if ((function == "smooth") != (angle == 30) && !faults::isWholeSweep()) continue;
+    if (angle == 30 && !faults::isWholeSweep()) continue;
     const auto draw = [&, &function = function](const Camera& camera, ImageSize size,
                                                 std::vector<double>& errors) {
       appendErrors(drawCache(halfAnnulusCache(faults::isWholeSweep() ? 128 : 96),

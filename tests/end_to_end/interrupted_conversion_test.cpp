@@ -39,7 +39,7 @@ class InterruptedConversion : public ProgramSuite<InterruptedConversion> {
   // Makes a grid so large that the least memory takes several buckets.
   static void prepare() {
     Progress progress;
-    writePlot3d(SceneGridSource(makeScene("wake"), {120, 80, 70}), *folder_ / "in", progress);
+    writePlot3d(SceneGridSource(makeScene("wake"), {100, 64, 56}), *folder_ / "in", progress);
     const fs::path undisturbed = *folder_ / "a.splats";
     run(wordsFor(undisturbed, {}));
     expected_ = checksumsOf(undisturbed);
@@ -85,8 +85,8 @@ class InterruptedConversion : public ProgramSuite<InterruptedConversion> {
 };
 
 TEST_F(InterruptedConversion, KilledItIsResumed) {
-  for (const int bricks : {-1, 0, 1, 12}) {
-    if (bricks % 12 != 0 && !faults::isWholeSweep()) continue;
+  for (const int bricks : {-1, 0, 1, 6}) {
+    if (bricks % 6 != 0 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(bricks);
     const auto program = startedUntil(bricks);
     program->signal(SIGKILL);

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 TEST_F(KeptCaches, ProcessesMayOpenOneNewFileAtOnce) {
-  for (int round = 0; round < (faults::isWholeSweep() ? 10 : 3); ++round) {
+  for (int round = 0; round < (faults::isWholeSweep() ? 10 : 1); ++round) {
     fs::remove_all("kept");
     std::vector<std::unique_ptr<RunningProgram>> programs;
     for (int n = 0; n < 4; ++n)
