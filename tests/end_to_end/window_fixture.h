@@ -21,6 +21,7 @@
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
+#include "tests/support/fault_sweep.h"
 #include "tests/support/program_test.h"
 #include "tests/support/virtual_display.h"
 
