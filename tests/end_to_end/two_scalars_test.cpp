@@ -94,11 +94,12 @@ TEST_F(TwoScalarsTest, AreThoseOfTheRayMarchAtAllLevels) {
     std::array<double, 3> least_db;  // finest, 4 pixels, 8 pixels
   } pictures[] = {{"smooth", {79, 73, 68.2}}, {"band", {73.5, 69, 63.5}}, {"step", {65.5, 65, 60}}};
   for (const auto& [name, least_db] : pictures) {
+    if (name == "step" && !faults::isWholeSweep()) continue;
     const KnownFunction function = KnownFunction::of(name);
     const Image reference = marched(function.exact, field_);
     for (size_t level = 0; level < 3; ++level) {
-      // Usually the smooth function where the picture is finest and coarsest, and the others at one level each.
-      const bool is_usual = name == "smooth" ? level != 1 : level == (name == "band" ? 1 : 2);
+      // Usually the smooth function where the picture is finest and coarsest, and the band between.
+      const bool is_usual = name == "smooth" ? level != 1 : level == 1;
       if (!is_usual && !faults::isWholeSweep()) continue;
       FrameOptions options = knownFrame(kLarge);
       options.lod_pixels = std::array{0.0, 4.0, 8.0}[level];
@@ -128,6 +129,7 @@ TEST_F(TwoScalarsTest, AreCutByClipPlanes) {
 }
 
 TEST_F(TwoScalarsTest, SlicesHaveTheColours) {
+  if (!faults::isWholeSweep()) GTEST_SKIP() << "SlicesHaveTheOpacitiesOfTheOther has the same colours";
   const glm::dvec3 point(-0.4, 0, 0.5), normal(0.6, 0.5, -0.7);
   const KnownFunction function = KnownFunction::of("smooth");
   const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
@@ -282,6 +284,8 @@ TEST_F(TwoScalarsTest, IsosurfacesAreOfAllScalarsAtOnce) {
   options.scene = scene;
   // The first has more nodes than isosurfaces are contoured in the cells of.
   for (const uint64_t nodes : {130, 128}) {
+    if (nodes == 130 && !faults::isWholeSweep())
+      continue;  // of one scalar Isosurfaces are in the field of splats
     const char* const name = nodes == 128 ? "a.splats" : "three.splats";
     if (nodes != 128) convertTo(name, 0, {nodes, 64, 64}, 3);
     const CacheReader cache(*folder_ / name);
@@ -404,6 +408,7 @@ TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
   options.lod_pixels = 8;  // OpenGL takes a second for a hundred thousand splats
   options.size = {128, 128};
   for (const bool full : {false, true}) {
+    if (!full && !faults::isWholeSweep()) continue;
     if (full) {
       auto scene = std::make_shared<SurfaceScene>();
       scene->slices = {{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}}};
