@@ -38,10 +38,12 @@ class Form:
 
 
 class SmokeForm(Form):
-    micro = ["--benchmark_min_time=0.000001", 
-             "--benchmark_filter=-plainReader|pager|osmesa/radius:([248]/|16/kind:[12])|cpu/radius:[248]/|radius:16/kind:2|chooseRegions/million:3$|"
-             "openIndex|lines:1000|side:(256|1024)|blank_every:1001|perspective:1/million"]
-    bench = ["--size", "64x64", "--lod-pixels", "2"]
+    # Of each benchmark its least form.
+    micro = ["--benchmark_min_time=0.000001",
+             "--benchmark_filter=-plainReader|pager|radius:[248]/|kind:[12]|million:(3|30|100|1000000)$|openIndex|makePlanner|lod_pixels:[14]|"
+             "lines:1000?/|side:(256|1024)|threads:2|blank_every:1001|perspective:1|readVts/(raw_|base64)|netcdf4$|readSingle|readDoubleNative|"
+             "splats:(512|65536)|workers:[24]"]
+    bench = ["--size", "64x64", "--lod-pixels", "2", "--backend", "cpu"]
     micro_cache = True  # they use the cache of the step "bench"
     cache = "32x32x32"
     convert_nodes = "30K"

@@ -26,12 +26,16 @@ def run(script, *arguments):
     return output([sys.executable, SCRIPTS / script, *arguments, "--program", PROGRAM])
 
 
+needs_whole = unittest.skipUnless("CURVISPLAT_WHOLE" in os.environ, "takes seconds; only with CURVISPLAT_WHOLE")
+
+
 class ShortForms(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         shutil.rmtree(FOLDER, ignore_errors=True)
         FOLDER.mkdir(parents=True)
 
+    @needs_whole
     def test_around(self):
         lines = run("around.py", FOLDER / "around", "--smoke").splitlines()[-13:]
         for line, name in zip(lines, ["plain", "lit", "six clip planes", "opaque body", "two scalars", "no depth (.exr)",
@@ -73,6 +77,7 @@ class ShortForms(unittest.TestCase):
         self.assertEqual(lines[0], "blocks: the same")
         self.assertRegex(lines[1], r"^old: \d+\.\d+ \+ \d+\.\d+ s, least ")
 
+    @needs_whole
     def test_lod_pixels(self):
         made = FOLDER / "levels"
         subprocess.run([PROGRAM, "generate", "half-annulus", "--size", "64x32x32", "-o", made], check=True, capture_output=True)
