@@ -81,7 +81,7 @@ class FewThreadsTest(LimitedUserTest):
             "histogram": "curvisplat.open('a.splats').histogram('s')", "view": "curvisplat.open('a.splats').view().close()"}
         for n, (name, work) in enumerate(works.items()):
             done = False
-            for processes in (*some_of(range(1, MOST_PROCESSES), 5, turn=n), MOST_PROCESSES):
+            for processes in (*some_of(range(1, MOST_PROCESSES), 9, turn=n), MOST_PROCESSES):
                 with self.subTest(name, processes=processes):
                     run = self.limited(work, processes)
                     self.assertEqual(run.returncode, 0, run.stderr)
@@ -99,7 +99,7 @@ class LittleAddressSpaceTest(unittest.TestCase):
         work = "import curvisplat" + ARRAYS.format("'o.splats'")
         script = (f"import os\ntry:\n{textwrap.indent(work, ' ')}\n"
                   "except (ImportError, MemoryError, RuntimeError):\n assert not os.listdir()\n")
-        for mebibytes in some_of(range(100, 640, 10), 9):
+        for mebibytes in some_of(range(100, 640, 10), 13):
             with self.subTest(mebibytes=mebibytes), tempfile.TemporaryDirectory() as folder:
                 run = subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, timeout=MOST_SECONDS,
                                      preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, 2 * (mebibytes << 20,)))
