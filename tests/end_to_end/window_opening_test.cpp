@@ -166,26 +166,16 @@ TEST_F(WindowOpening, ViewOpensAGrid) {
   expectDraws(command, picture);
 }
 
-/// A desktop drops files in any order, and a dialog sorts them by name.
-TEST_F(WindowOpening, TheGridNeedNotComeFirst) {
-  openWith({"a.fun", "a.xyz"});
-  placeOf("curve");
-  saveAndCopy();
-  const auto command = close().at(0);
-  EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "a.fun", "a.xyz"}));
-}
-
-/// Several solutions of one grid have pictures of their own names, in whichever order the files are given.
-TEST_F(WindowOpening, PicturesHaveTheNameOfTheSolution) {
+/// A desktop drops files in any order, and a dialog sorts them by name. Several solutions of one grid have pictures of their own names.
+TEST_F(WindowOpening, TheGridNeedNotComeFirstAndPicturesHaveTheNameOfTheSolution) {
   fs::copy_file("a.fun", "flow.fun", fs::copy_options::overwrite_existing);
   cache_ = "flow";
-  for (const Words& files : {Words{"a.xyz", "flow.fun"}, {"flow.fun", "a.xyz"}}) {
-    openWith(files);
-    placeOf("curve");
-    save();  // which waits for a picture of that name
-    close();
-  }
+  openWith({"flow.fun", "a.xyz"});
+  placeOf("curve");
+  saveAndCopy();  // which waits for a picture of that name
+  const auto command = close().at(0);
   cache_ = "a";
+  EXPECT_EQ(Words(command.begin(), command.begin() + 3), (Words{"render", "flow.fun", "a.xyz"}));
 }
 
 TEST_F(WindowOpening, TheDialogTakesSeveralFiles) {
@@ -277,12 +267,14 @@ TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
   moveTo(middle);
   act({"mousedown", "1"});
   int moves = 0;
+  const auto moveOn = [&] { moveTo({middle.first + 20 + ++moves % 9, middle.second + 10}); };
   EXPECT_TRUE(eventually(
       [&] {
-        moveTo({middle.first + 20 + ++moves % 9, middle.second + 10});
-        return !hasWidget("opening");
+        moveOn();  // and not again at once: each movement draws a picture, which the conversion waits for
+        return eventually([] { return !hasWidget("opening"); }, 1);
       },
       300));
+  for (int n = 0; n < 3; ++n) moveOn();
   act({"mouseup", "1"});
   EXPECT_TRUE(eventually([] { return !hasWidget("state preview") && hasWidget("state "); }, 300));
   EXPECT_TRUE(
@@ -298,7 +290,7 @@ TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
   const std::string position = valueOf(command, "--position");
   EXPECT_EQ(position.find("nan"), std::string::npos) << position;
   EXPECT_NE(std::find(command.begin(), command.end(), "--parallel-scale"), command.end());
-  expectDraws(command, picture);
+  if (faults::isWholeSweep()) expectDraws(command, picture);  // ViewOpensAGrid draws that of a small grid
 }
 
 TEST_F(WindowOpening, APreviewThatIsStoppedSaysSo) {
@@ -559,12 +551,20 @@ TEST_F(WindowOpening, AScalarIsAddedToASeries) {
     EXPECT_EQ(entry.path().filename().string().find(".adding"), std::string::npos);
 }
 
-/// A coarse sample of the first step, then the step, then all of them.
+/// A coarse sample of the first step, then the step, then all of them. Usually it is stopped at the first of these:
+/// ASeriesThatIsStoppedLeavesNothing sees the next, and ASeriesIsOpened the last.
 TEST_F(WindowOpening, ASeriesOfLargeStepsHasACoarsePreview) {
   run({"generate", "wake", "--size", "128x96x84", "--steps", "2", "-o", "wide"});
   openWith({"wide.xyz", "wide_0000.fun", "wide_0001.fun"});
   EXPECT_TRUE(
       eventually([] { return hasWidget("state preview of every 2nd index plane of the first time step"); }));
+  if (!faults::isWholeSweep()) {
+    click("stop opening");
+    EXPECT_TRUE(eventually([] { return !hasWidget("stop opening"); }));
+    close();
+    EXPECT_EQ(previewFolders(), 0u);
+    return;
+  }
   press("x");
   EXPECT_TRUE(eventually([] { return hasWidget("state preview of the first time step"); }, 300));
   EXPECT_TRUE(eventually([] { return hasWidget("step") && !hasWidget("opening"); }, 300));
