@@ -230,7 +230,7 @@ TEST_F(OddFiles, WithoutThreadsItEndsWithOneLine) {
        {"--version", "info cube.splats", "info cube.xyz cube.fun", "convert cube.xyz cube.fun -o b.splats",
         "render cube.splats -o b.png --size 64x64 --memory 256M"}) {
     bool succeeded = false;
-    for (int mebibytes = 100; mebibytes < 700 && !succeeded; mebibytes += faults::isWholeSweep() ? 20 : 40) {
+    for (int mebibytes = 100; mebibytes < 700 && !succeeded; mebibytes += faults::isWholeSweep() ? 20 : 80) {
       const ProgramResult result = runWithin(folder_, command, 1024 * mebibytes);
       if (result.status == kNotLoaded) continue;
       succeeded = result.status == 0;
@@ -260,7 +260,7 @@ TEST_F(OddFiles, AnExportIsCompleteWhereItsComparisonFindsNoMemory) {
     has_warned |= !compared;
   };
   const std::string command = "export cube.splats -o b.ply";
-  for (int mebibytes = 100; mebibytes < 700; mebibytes += faults::isWholeSweep() ? 10 : 60)
+  for (int mebibytes = 100; mebibytes < 700; mebibytes += faults::isWholeSweep() ? 10 : 150)
     expectComplete(runWithin(folder_, command, 1024 * mebibytes));
   EXPECT_TRUE(has_warned || !faults::isWholeSweep());
   has_warned = false;
@@ -277,7 +277,7 @@ TEST_F(OddFiles, AFrameWhoseBuffersJustFitEndsWithOneLine) {
     const int middle = (refused + sufficient) / 2;
     (runWithin(folder_, command, middle).status == 0 ? sufficient : refused) = middle;
   }
-  for (int n = 0; n < 16; n += faults::isWholeSweep() ? 1 : 2) {
+  for (int n = 0; n < 16; n += faults::isWholeSweep() ? 1 : 3) {
     const int limit = sufficient - 347 * n;
     const ProgramResult result = runWithin(folder_, command, limit);
     EXPECT_LE(result.status, 1) << limit << " KiB: " << result.err;
@@ -399,7 +399,7 @@ TEST_F(OddFiles, ProgramsMayWriteTheSamePicture) {
   const Words words{"render", cache(), "-o", file("a.png"), "--size", "200x200"};
   run(words);
   const std::string expected = readTextFile(file("a.png"));
-  for (int round = 0; round < (faults::isWholeSweep() ? 5 : 2); ++round) {
+  for (int round = 0; round < (faults::isWholeSweep() ? 5 : 1); ++round) {
     std::vector<std::unique_ptr<RunningProgram>> programs;
     for (int n = 0; n < 4; ++n) programs.push_back(std::make_unique<RunningProgram>(words));
     for (const auto& program : programs) {

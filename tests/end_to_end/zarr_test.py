@@ -30,6 +30,7 @@ class ZarrStores(ModelFileTest):
 
     def setUp(self):
         super().setUp()
+        self.expected = {}  # of file.nc, by step
         self.lon, self.lat = np.linspace(-20, 24, self.NI), np.linspace(30, 46, self.NJ)
         self.depth, self.hours = np.linspace(0, 4000, self.NK), np.array([0.0, 6, 12])
         self.temp = (5 + RANDOM.random((self.NT, self.NK, self.NJ, self.NI))).astype("f4")
@@ -62,7 +63,9 @@ class ZarrStores(ModelFileTest):
 
     def expect_same(self, *words):
         for step in ("0", "2"):
-            self.assertEqual(self.measured(*words, "--time-step", step), self.measured("file.nc", "--time-step", step), (words, step))
+            if step not in self.expected:
+                self.expected[step] = self.measured("file.nc", "--time-step", step)
+            self.assertEqual(self.measured(*words, "--time-step", step), self.expected[step], (words, step))
 
     # -- writers
 
@@ -165,7 +168,7 @@ class ZarrStores(ModelFileTest):
 
     def test_numbers_of_every_type(self):
         for version in (2, 3):
-            for kind in "i1 u1 i2 u2 i4 u4 i8 u8 f2 f4 f8 ?".split():
+            for kind in some_of("i1 u1 i2 u2 i4 u4 i8 u8 f2 f4 f8 ?".split(), 2, turn=version):
                 store = Store(self.folder / f"{version}.zarr", version)
                 values = (np.arange(5 * 6 * 7).reshape(5, 6, 7) % 90).astype(kind)
                 for name, length in (("z", 5), ("y", 6), ("x", 7)):
