@@ -18,6 +18,7 @@
 #include "tools/commands/commands.h"
 #include "tools/commands/grid_faces.h"
 #include "tools/options/grid_surfaces.h"
+#include "tools/options/kept_caches.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/shared_options.h"
 #include "tools/output/command_run.h"
@@ -69,14 +70,25 @@ void warnOfNetwork(const ServerOptions& options) {
       options.address);
 }
 
+/// The caches; of a grid with its solutions the one that is kept for it.
+std::vector<std::filesystem::path> cachesToServe(const std::vector<std::filesystem::path>& files) {
+  if (!isGrid({files.front()})) return files;
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  KeptCacheEvents events;
+  events.say = [](const std::string& text) { printMessage("{}", text); };
+  return {keptCacheOf(files, progress, events)};
+}
+
 void serve(const ServeArguments& arguments) {
+  const ServerOptions options = optionsFrom(arguments);
+  const std::vector<std::filesystem::path> caches = cachesToServe(arguments.caches);
   // What viewers had goes back to the system once they have left: of three of 96 MiB, a heap for each thread kept up to 480 MiB. A
   // picture takes the same time (on two cores).
   limitHeaps(1);
   returnFreedMemory(kLargeBlock);
-  const ServerOptions options = optionsFrom(arguments);
   warnOfNetwork(options);
-  ServedFolders folders(arguments.caches, faceNamesOf);
+  ServedFolders folders(caches, faceNamesOf);
   const size_t served = folders.caches()->size();
   requireThreads();
   Progress progress;
@@ -95,8 +107,13 @@ void serve(const ServeArguments& arguments) {
 
 void addServe(CLI::App& app) {
   auto arguments = std::make_shared<ServeArguments>();
-  CLI::App* command = app.add_subcommand("serve", "Show caches in a web browser");
-  command->add_option("CACHE", arguments->caches, "Splat caches, directories NAME.splats")->required();
+  CLI::App* command = app.add_subcommand("serve", "Show caches or a grid in a web browser");
+  command
+      ->add_option(
+          "CACHE", arguments->caches,
+          "Splat caches, directories NAME.splats; or a grid and its solutions, which are converted into "
+          "the user's cache folder")
+      ->required();
   command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")
       ->check(CLI::Range(0u, 65535u))
       ->capture_default_str();

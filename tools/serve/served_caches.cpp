@@ -226,7 +226,6 @@ std::string ServedCaches::markerText(size_t cache_number, const MarkedScalar& sc
   const CacheReader reader = cache.reader.atStep(scalar.step);
   const auto found = point ? probe(reader, {&variable, 1}, *point) : std::nullopt;
   const char* const type = scalar.hovers ? "value" : "marker";
-  if (!found && !scalar.hovers) throw UsageError("there is nothing at this place");
   if (!found)
     return textOf(
         {{"type", type}, {"cache", cache_number}, {"x", scalar.x}, {"y", scalar.y}, {"marker", nullptr}});
