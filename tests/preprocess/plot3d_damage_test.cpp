@@ -239,6 +239,9 @@ TEST(Plot3dDamage, WrongKindsAreNamed) {
   layout.kind = Plot3dKind::kQ;
   const std::string as_grid = plot3dError(folder, plot3dBytes(layout, {testBlock(6, 5, 4, 5)}));
   expectSays(as_grid, "looks like a solution without its grid (a Q solution of 1 block of 6x5x4");
+  folder.write("grid.xyz", grid);  // beside the solution, which is "grid"
+  expectSays(plot3dError(folder, plot3dBytes(layout, {testBlock(6, 5, 4, 5)})),
+             "its grid, too (perhaps grid.xyz)");
 }
 
 /// A disk whose blocks from some offset on cannot be read.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -336,9 +337,20 @@ class Detection {
     others.force = {};
     for (const Plot3dFit& fit : fitPlot3d(others).fits)
       if (fit.trailing_bytes <= kMaxPadding && !fit.layout.two_dimensional)
-        throw Error("{}: looks like a solution without its grid (a {} of {}, {}); choose its grid, too",
+        throw Error("{}: looks like a solution without its grid (a {} of {}, {}); choose its grid, too{}",
                     path_, curvisplat::describe(fit.layout.kind), curvisplat::describe(fit.blocks),
-                    curvisplat::describe(fit.layout));
+                    curvisplat::describe(fit.layout), gridBeside());
+  }
+
+  /// The name of a file beside the solution that is its grid by the name, in parentheses; empty without one.
+  std::string gridBeside() const {
+    for (const char* const ending : {".xyz", ".x", ".g", ".grd", ".grid"}) {
+      const auto grid = std::filesystem::path(path_).replace_extension(ending);
+      std::error_code ignored;
+      if (grid != path_ && std::filesystem::is_regular_file(grid, ignored))
+        return fmt::format(" (perhaps {})", grid.filename().string());
+    }
+    return {};
   }
 
   /// Describes only the properties that are decided before sizes are compared.
