@@ -347,9 +347,12 @@ TEST_F(WindowOpening, AFileDroppedIsOpened) {
   drop({"a.xyz", "a.fun"});
   placeOf("curve");
   EXPECT_EQ(kept().size(), 1u);
+  press("b");
+  save();
   drop({"a.splats"});
   EXPECT_TRUE(eventually([] { return titleOfWindow().starts_with("a.splats"); }));
-  close();
+  saveAndCopy();
+  EXPECT_EQ(valueOf(close().at(0), "--background"), "white");  // as before
 }
 
 TEST_F(WindowOpening, ASeriesIsOpened) {

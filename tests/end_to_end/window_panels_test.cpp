@@ -513,6 +513,15 @@ TEST_F(WindowPanels, KeysAndMessagesAreShown) {
   widget("item Open...");
   press("Escape");
   EXPECT_TRUE(gone("item Open..."));
+  // So does a click into the picture, which sets no marker.
+  click("scalar");
+  widget("scalar volume");
+  click(placeOf("picture"));
+  EXPECT_TRUE(gone("scalar volume"));
+  save();
+  click(placeOf("picture"));
+  widget("sign of marker 1");
+  EXPECT_FALSE(hasWidget("sign of marker 2"));
   choose("Window", "Messages");
   widget("window Messages");
   close();

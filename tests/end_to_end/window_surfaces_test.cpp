@@ -228,6 +228,13 @@ TEST_F(WindowSurfaces, AnIsosurfaceThatIsRemovedLeavesTheVolumeAsBefore) {
   click("isosurface 1 by volume");
   moveTo(rest_);
   EXPECT_LT(difference(saveAndCopy(), before), 45);
+  moveTo(placeOf("isosurface 1"));
+  act({"click", "--repeat", "2", "--delay", "50", "1"});
+  press("ctrl+a");
+  save();
+  act({"type", "99"});
+  press("Return");
+  EXPECT_TRUE(eventually([] { return hasWidget("nothing is drawn: values reach from "); }));
   click("remove isosurface 1");
   EXPECT_TRUE(gone("remove isosurface 1"));
   moveTo(rest_);

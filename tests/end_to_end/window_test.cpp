@@ -487,6 +487,13 @@ TEST_F(WindowTest, FollowsTheWindowsSize) {
   const Image resized = saveAndCopy();
   EXPECT_EQ(resized.size.width, pictureSize().width);
   EXPECT_EQ(resized.size.height, pictureSize().height);
+  // The first view shows all of the data in a narrow picture, too.
+  resize({600, 650});
+  const Image narrow = save();
+  size_t differing = 0;
+  for (int y = 1; y < narrow.size.height; ++y)
+    differing += !std::equal(narrow.pixel(0, y), narrow.pixel(0, y) + 3, narrow.pixel(0, 0));
+  EXPECT_EQ(differing, 0u);
   expectDraws(close().at(0), resized);
 }
 

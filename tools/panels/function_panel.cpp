@@ -241,12 +241,15 @@ bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
   const std::string shown =
       map.empty() ? "(edited)"
                   : map + (function.isAutomatic() ? fmt::format(" ({})", EditedFunction::kAutomatic) : "");
-  const bool open = ImGui::BeginCombo("##colours", shown.c_str(), ImGuiComboFlags_HeightLarge);
-  if (!open) {
+  if (!combo("##colours", shown, ImGuiComboFlags_HeightLarge,
+             "of the scalar's values along the range; opacities that were edited stay")) {
     nameWidget("colours");
-    hint("of the scalar's values along the range; opacities that were edited stay");
     return false;
   }
+  const float swatch = 7 * ImGui::GetFontSize();
+  float width = ImGui::GetContentRegionAvail().x;  // of the longest name, for which the list becomes wide
+  for (const PublishedMap& one : builtInMaps())
+    width = std::max(width, swatch + 8 + ImGui::CalcTextSize(std::string(one.name).c_str()).x);
   if (ImGui::Selectable(EditedFunction::kAutomatic, function.isAutomatic())) result.automatic = true;
   nameWidget("colours chosen from the data");
   for (const auto& [category, title] : {std::pair(MapCategory::kSequential, "sequential"),
@@ -257,8 +260,8 @@ bool FunctionPanel::drawMaps(EditedFunction& function, Result& result) {
       if (one.category != category) continue;
       const std::string name(one.name);
       const ImVec2 at = ImGui::GetCursorScreenPos();
-      const float swatch = 7 * ImGui::GetFontSize();
-      const bool chosen = ImGui::Selectable(("##" + name).c_str(), !function.isAutomatic() && name == map);
+      const bool chosen =
+          ImGui::Selectable(("##" + name).c_str(), !function.isAutomatic() && name == map, 0, {width, 0});
       nameWidget("colours " + name);
       const TransferFunctionDefinition& preset = definitionOf(name);
       const ColourMap colours(preset.colours, preset.colour_space);
@@ -372,6 +375,14 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
     }
   nameWidget("percentile range");
   hint("without the lowest and the highest values, which fill 1 % of the volume each");
+  if (all.min < 0 && all.max > 0) {
+    if (ImGui::Button("Symmetric")) {
+      const double reach = std::max(std::abs(ends[0]), std::abs(ends[1]));
+      set(-reach, reach);
+    }
+    nameWidget("symmetric range");
+    hint("the range, widened until zero is in its middle: white, in most diverging maps");
+  }
   if (steps.size() > 1) {
     ImGui::SameLine();
     const StepValues& of = steps[step].values[variable];

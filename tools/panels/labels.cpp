@@ -196,4 +196,19 @@ void drawFurther(const FurtherScalars& further, const WantedScalar& wanted, cons
   ImGui::EndDisabled();
 }
 
+bool combo(const char* label, const std::string& text, int flags, const std::string& what) {
+  const float width = ImGui::CalcItemWidth() - ImGui::GetFrameHeight() - 2 * ImGui::GetStyle().FramePadding.x;
+  std::string shown = text;
+  for (size_t length = text.size(); length > 0 && ImGui::CalcTextSize(shown.c_str()).x > width;) {
+    --length;
+    const bool in_letter = (static_cast<unsigned char>(text[length]) & 0xc0u) == 0x80;  // of UTF-8
+    if (!in_letter) shown = text.substr(0, length) + "\u2026";
+  }
+  const bool open = ImGui::BeginCombo(label, shown.c_str(), flags);
+  const std::string cut = shown == text ? "" : text;
+  const std::string hinted = cut + (cut.empty() || what.empty() ? "" : ": ") + what;
+  if (!open && !hinted.empty()) hint(hinted.c_str());
+  return open;
+}
+
 }  // namespace curvisplat

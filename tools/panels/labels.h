@@ -83,6 +83,8 @@ class Section {
 /// names of widgets.
 void drawFurther(const FurtherScalars& further, const WantedScalar& wanted, const std::string& prefix,
                  PanelActions& actions);
+/// Dear ImGui's BeginCombo(). A text that is too long for it ends with an ellipsis, and is in its hint. `what`: the rest of the hint.
+bool combo(const char* label, const std::string& text, int flags, const std::string& what = "");
 /// Shows a line under the widget that the mouse is over, after a moment; of one that fills the line behind its label, over the label, too.
 void hint(const char* text);
 

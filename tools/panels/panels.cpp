@@ -188,7 +188,7 @@ void drawElsewhere(const std::vector<std::string>& names, PanelActions& actions)
 void Panels::drawScalars(const ViewState& state, const PanelFacts& facts, PanelActions& actions) {
   const auto& variables = cache_.manifest().variables;
   label("scalar");
-  if (ImGui::BeginCombo("##scalar", state.variable.c_str(), ImGuiComboFlags_HeightLargest)) {
+  if (combo("##scalar", state.variable, ImGuiComboFlags_HeightLargest)) {
     for (const VariableInfo& one : variables) {
       const bool chosen = one.name == state.variable;
       const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen);
@@ -211,8 +211,8 @@ void Panels::drawOpacityScalars(const ViewState& state, const PanelFacts& facts,
   label("opacity by");
   ImGui::BeginDisabled(variables.size() < 2 && !has_further);
   constexpr const char* kSame = "the same scalar";
-  if (ImGui::BeginCombo("##opacity by", state.opacity_by ? state.opacity_by->variable.c_str() : kSame,
-                        ImGuiComboFlags_HeightLarge)) {
+  if (combo("##opacity by", state.opacity_by ? state.opacity_by->variable : kSame,
+            ImGuiComboFlags_HeightLarge)) {
     if (ImGui::Selectable(kSame, !state.opacity_by)) actions.opacity_scalar = "";
     nameWidget("opacity by the same scalar");
     for (const VariableInfo& one : variables) {

@@ -354,8 +354,7 @@ void SurfacePanel::drawColouring(const ViewState& state, const FurtherScalars* f
   constexpr const char* kOwn = "a colour of its own";
   label("faces coloured by");
   ImGui::BeginDisabled(state.faces.empty());
-  if (ImGui::BeginCombo("##surfaces by", state.faces_by ? state.faces_by->variable.c_str() : kOwn,
-                        ImGuiComboFlags_HeightLarge)) {
+  if (combo("##surfaces by", state.faces_by ? state.faces_by->variable : kOwn, ImGuiComboFlags_HeightLarge)) {
     if (ImGui::Selectable(kOwn, !state.faces_by)) actions.colour_faces = "";
     nameWidget("surfaces by no scalar");
     for (const VariableInfo& one : cache_.manifest().variables) {
@@ -402,7 +401,7 @@ void SurfacePanel::drawIsosurfaces(ViewState& state, const FurtherScalars* furth
 void SurfacePanel::chooseScalarOf(size_t number, const Isosurface& one, const FurtherScalars* further,
                                   PanelActions& actions) const {
   const std::string name = fmt::format("isosurface {}", number + 1);
-  if (!ImGui::BeginCombo("##scalar", one.scalar.c_str(), ImGuiComboFlags_HeightLarge)) {
+  if (!combo("##scalar", one.scalar, ImGuiComboFlags_HeightLarge)) {
     nameWidget("scalar of " + name);
     nameWidget(fmt::format("{} shows: {}", name, one.scalar));
     return;
@@ -423,12 +422,16 @@ void SurfacePanel::drawValueOf(Isosurface& one, const std::string& name, PanelAc
   const double highest = info ? info->max : one.value;
   label("value");
   ImGui::BeginDisabled(!info);
-  if (slider("##value", one.value, lowest, highest, "%.5g", ImGuiSliderFlags_AlwaysClamp))
-    actions.changed = true;
+  if (slider("##value", one.value, lowest, highest, "%.5g", ImGuiSliderFlags_None)) actions.changed = true;
   ImGui::EndDisabled();
   actions.dragging |= isDragged();
   nameWidget(name);
   hint("double click to type a number");
+  if (one.value >= lowest && one.value <= highest) return;
+  const std::string text =
+      fmt::format("nothing is drawn: values reach from {:.5g} to {:.5g}", lowest, highest);
+  ImGui::TextWrapped("%s", text.c_str());
+  nameWithoutTab(text);
 }
 
 /// Draws a colour of its own, or the function's, which choosing another one replaces.

@@ -76,6 +76,7 @@ CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options,
       first_function_(state_.function),
       first_camera_(prepared.first_camera),
       first_size_(prepared.first_size),
+      left_camera_(first_camera_),
       first_state_(options.carried ? "" : toJson(state_)),
       history_(options.carried && options.carried->history ? *options.carried->history : History(state_, {})),
       panels_(cache_),
@@ -186,14 +187,21 @@ void CacheView::draw(const WindowLayout& layout) {
 }
 
 /// Zooms out where bars take more of the width than they did when the view was fitted, and in again when they go, so that
-/// what is between the picture's sides stays there.
+/// what is between the picture's sides stays there. The first view, which nobody has turned, is that of another size's.
 void CacheView::fitTo(ImageSize size) {
   const double before = zoomForBars();
-  const bool is_resized = !same(size, picture_size_);
+  const bool is_resized = !same(size, picture_size_), is_first = isSameView(state_.camera, left_camera_);
   picture_size_ = size;
   takeBars();
-  if (is_resized) fitted_width_ = data_size_.width / before;
-  if (zoomForBars() != before) state_.camera = zoomed(state_.camera, zoomForBars() / before);
+  if (is_resized && is_first) {
+    state_.camera = firstCamera();
+    fitted_width_ = data_size_.width;
+  } else if (is_resized) {
+    fitted_width_ = data_size_.width / before;
+  } else if (zoomForBars() != before) {
+    state_.camera = zoomed(state_.camera, zoomForBars() / before);
+  }
+  if (is_first) left_camera_ = state_.camera;
 }
 
 double CacheView::zoomForBars() const {

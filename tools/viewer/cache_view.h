@@ -100,6 +100,7 @@ class CacheView {
 
   /// The settings of this view that another view of the same grid takes over: all but those that name scalars which the
   /// other's cache does not have. nullptr if this is a preview that the user has left as it was.
+  bool isDark() const { return state_.dark; }
   std::shared_ptr<const CarriedView> carriedTo(const PreparedView& next) const;
   const std::optional<Preview>& preview() const { return preview_; }
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }
@@ -129,6 +130,7 @@ class CacheView {
   void saveMovieOf(MovieKind kind);
   void copyLater(MovieKind what) { copy_requested_ = what; }
   void moveCamera(Command command);
+  Camera firstCamera() const;
   void lookAsAtFirst();
   void chooseForSheets();
 
@@ -231,6 +233,8 @@ class CacheView {
   const EditedFunction first_function_;
   const Camera first_camera_;  // PreparedView's
   const ImageSize first_size_;
+  Camera
+      left_camera_;  // the first view as the picture's size has it, by which one that nobody turned is known
   const std::string first_state_;  // as JSON; empty if it was another view's, which somebody had changed
   History history_;
   Panels panels_;

@@ -177,15 +177,19 @@ void CacheView::takeIsosurfaces() {
   changed_ = true;
 }
 
-/// Looks as at the beginning, before anything was turned, in this window or in one before it, and flies no more.
-void CacheView::lookAsAtFirst() {
+/// The view before anything was turned, in this window or in one before it, for the picture's size.
+Camera CacheView::firstCamera() const {
   constexpr double kAsWide = 0.97;  // bars with text of the panels' size are a little wider or narrower
   const auto aspect = [](ImageSize of) { return static_cast<double>(of.width) / of.height; };
   const bool fits = aspect(data_size_) > kAsWide * aspect(first_size_);
-  state_.camera = fits ? first_camera_ : holding(first_camera_, first_size_, data_size_);
-  if (state_.scale != glm::dvec3(1.0))
-    state_.camera =
-        refitted(state_.camera, state_.scale * manifest().lower, state_.scale * manifest().upper, data_size_);
+  const Camera camera = fits ? first_camera_ : holding(first_camera_, first_size_, data_size_);
+  if (state_.scale == glm::dvec3(1.0)) return camera;
+  return refitted(camera, state_.scale * manifest().lower, state_.scale * manifest().upper, data_size_);
+}
+
+/// Looks as at the beginning, and flies no more.
+void CacheView::lookAsAtFirst() {
+  state_.camera = left_camera_ = firstCamera();
   fitted_width_ = data_size_.width;
   navigation_.endFlight();
   film_.stop();

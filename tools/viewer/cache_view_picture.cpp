@@ -176,12 +176,8 @@ void CacheView::probe(const WindowLayout& layout) {
 
 /// Whether what is shown now is seen under the same pixel as when it was clicked.
 bool CacheView::isSeenAt(const Click& click) const {
-  const Camera &then = click.camera, &now = state_.camera;
-  return then.position == now.position && then.focal_point == now.focal_point &&
-         then.view_up == now.view_up && then.projection == now.projection &&
-         then.parallel_scale == now.parallel_scale && then.view_angle_deg == now.view_angle_deg &&
-         click.size.width == data_size_.width && click.size.height == data_size_.height &&
-         click.at == playback_.position();
+  return isSameView(click.camera, state_.camera) && click.size.width == data_size_.width &&
+         click.size.height == data_size_.height && click.at == playback_.position();
 }
 
 void CacheView::drawStatus(const WindowLayout& layout) {

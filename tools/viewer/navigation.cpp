@@ -59,6 +59,12 @@ Camera panned(const Camera& camera, const glm::dvec2& movement, ImageSize size) 
   return result;
 }
 
+bool isSameView(const Camera& a, const Camera& b) {
+  return a.position == b.position && a.focal_point == b.focal_point && a.view_up == b.view_up &&
+         a.projection == b.projection && a.parallel_scale == b.parallel_scale &&
+         a.view_angle_deg == b.view_angle_deg;
+}
+
 Camera zoomed(const Camera& camera, double factor) {
   Camera result = camera;
   if (camera.projection == Projection::kOrthographic)

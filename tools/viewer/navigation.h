@@ -25,6 +25,7 @@ namespace curvisplat {
 Camera rotated(const Camera& camera, const glm::dvec2& movement, ImageSize size);
 /// Moves parallel to the image; points at the focal point's depth follow the mouse.
 Camera panned(const Camera& camera, const glm::dvec2& movement, ImageSize size);
+bool isSameView(const Camera& a, const Camera& b);
 /// Magnifies objects at the focal point's depth by `factor` > 0; a perspective camera moves towards the
 /// point.
 Camera zoomed(const Camera& camera, double factor);

@@ -174,6 +174,7 @@ ViewerOptions OpenedView::viewOptions() const {
   options.conversion = options_.conversion;
   options.faces = options_.faces;
   options.encodes_movies = options_.encodes_movies;
+  if (view_) options.dark = view_->isDark();
   return options;
 }
 

@@ -107,6 +107,8 @@ PreparedView prepareView(CacheReader cache, const ViewerOptions& options, ImageS
     } catch (const Error& error) {
       printMessage("warning: {}; using the initial view", error.what());
     }
+  } else {
+    state.dark = options.dark;
   }
   if (options.scalar && *options.scalar != state.variable) chooseVariable(state, cache, *options.scalar);
   if (options.memory_bytes) state.memory_bytes = *options.memory_bytes;

@@ -53,6 +53,7 @@ struct ViewerOptions {
   std::optional<uint64_t> memory_bytes;
   ConversionServices conversion;
   OpenMovieOutput open_movie;
+  bool dark = true;                          // the background, where nothing says otherwise
   bool encodes_movies = true;                // ffmpeg is there, which .mp4 and .gif need
   std::vector<std::filesystem::path> files;  // to open first, in place of a cache
   double target_s = 0.033;                   // per picture while moving

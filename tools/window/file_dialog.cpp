@@ -113,6 +113,7 @@ void FileDialog::open(Purpose purpose, const std::string& name) {
   frames_to_focus_ = kFramesToFocus;
   all_files_ = help_ = false;
   std::error_code ignored;
+  folder_ = lookOf(purpose).saves ? save_folder_ : open_folder_;
   if (folder_.empty() && purpose == Purpose::kOpenData && fs::is_directory(data_folder_, ignored))
     folder_ = data_folder_;
   enter(folder_.empty() ? fs::current_path(ignored) : folder_);
@@ -214,7 +215,8 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   if (chosen) {
     std::error_code ignored;
     const fs::path from = chosen->files.front().parent_path();
-    if (fs::is_directory(from, ignored)) folder_ = from;  // offered the next time, as where a path was typed
+    if (fs::is_directory(from, ignored))
+      (look.saves ? save_folder_ : open_folder_) = from;  // also of a typed path
     if (chosen->purpose == Purpose::kOpenData) data_folder_ = from;
   }
   if (cancels || chosen) {

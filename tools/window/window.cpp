@@ -462,10 +462,11 @@ void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
     self->dragged_button_ = button;
     self->dragged_with_shift_ = (mods & GLFW_MOD_SHIFT) != 0;
     self->pressed_at_ = self->mouse_;
+    self->press_closes_ = ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopup);
   } else if (action == GLFW_RELEASE && button == self->dragged_button_) {
     self->dragged_button_ = -1;
     const bool stayed = glm::length(self->mouse_ - self->pressed_at_) < kClickReach;
-    if (stayed && button == GLFW_MOUSE_BUTTON_LEFT && !self->dragged_with_shift_)
+    if (stayed && button == GLFW_MOUSE_BUTTON_LEFT && !self->dragged_with_shift_ && !self->press_closes_)
       self->clicks_.push_back(self->mouse_);
   }
 }

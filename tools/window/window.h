@@ -213,6 +213,7 @@ class Window {
   bool light_ = false;
   glm::dvec2 mouse_{0.0}, pressed_at_{0.0};
   int dragged_button_ = -1;
+  bool press_closes_ = false;  // a list or a menu, which is all that this press is for
   bool dragged_with_shift_ = false;
   std::vector<Drag> drags_;
   double wheel_ = 0;
