@@ -104,7 +104,7 @@ TEST_F(Isosurfaces, CrossingsHaveTheirOpacityAndTheirLight) {
                   {1, true, {51.5, 51.5, 51}, 51},
                   {0.5, true, {54, 54, 53.5}, 52}};
   for (const auto& [opacity, volume, least_db, least_in_cells_db] : pictures) {
-    if ((opacity < 1) == volume && !faults::isWholeSweep()) continue;
+    if ((opacity < 1) != volume && !faults::isWholeSweep()) continue;
     const Image reference = marched(volume ? function.exact : nothing, colour, opacity);
     for (size_t n = 0; n < 3; ++n) {
       if (n == 1 && !faults::isWholeSweep()) continue;
@@ -131,15 +131,14 @@ TEST_F(Isosurfaces, EveryPainterDrawsTheSame) {
 }
 
 TEST_F(Isosurfaces, MeshesLieOnThemWithoutGaps) {
-  const std::string voxels = faults::isWholeSweep() ? "200" : "120";
   const std::string said =
-      run({"export", file("a.splats"), "-o", file("a.ply"), "--iso", "0.5", "--voxels", voxels}).out;
+      run({"export", file("a.splats"), "-o", file("a.ply"), "--iso", "0.5", "--voxels", "200"}).out;
   expectSays(said, "a.ply: isosurface of f at 0.5: ");
   const InputFile ply(file("a.ply"));
   std::vector<std::byte> bytes(ply.size());
   ply.readAt(0, std::span(bytes));
   const RawMesh mesh = parseMesh(bytes, file("a.ply"));
-  ASSERT_GT(mesh.triangles.size(), 5000u);
+  ASSERT_GT(mesh.triangles.size(), 10000u);
   const std::vector<double> off = distances(mesh.positions);  // a cell of the grid is 0.02 to 0.05 long
   fmt::print("mesh: 99 % within {:.5f}, all within {:.5f}\n", off[off.size() * 99 / 100], off.back());
   EXPECT_LT(off[off.size() * 99 / 100], 0.01);
@@ -163,11 +162,11 @@ TEST_F(Isosurfaces, MeshesLieOnThemWithoutGaps) {
   }
   EXPECT_GT(open, 0u);
   EXPECT_EQ(inside, 0u) << "of " << open;
-  // The same triangles in another format and with little memory.
-  run({"export", file("a.splats"), "-o", file("a.stl"), "--iso", "0.5", "--voxels", voxels, "--memory",
-       "24M"});
+  // The same triangles in every format and with little memory.
+  for (const char* name : {"a.vtp", "a.stl"})
+    run({"export", file("a.splats"), "-o", file(name), "--iso", "0.5", "--voxels", "200", "--memory", "24M"});
   EXPECT_EQ(readMeshFile(file("a.stl")).triangles.size(), readMeshFile(file("a.ply")).triangles.size());
-  run({"export", file("a.splats"), "-o", file("b.ply"), "--iso", "0.5", "--voxels", voxels, "--memory",
+  run({"export", file("a.splats"), "-o", file("b.ply"), "--iso", "0.5", "--voxels", "200", "--memory",
        "24M"});
   const InputFile again(file("b.ply"));
   std::vector<std::byte> more(again.size());

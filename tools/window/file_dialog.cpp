@@ -113,10 +113,8 @@ void FileDialog::open(Purpose purpose, const std::string& name) {
   frames_to_focus_ = kFramesToFocus;
   all_files_ = help_ = false;
   std::error_code ignored;
-  folder_ = lookOf(purpose).saves ? save_folder_ : open_folder_;
-  if (folder_.empty() && purpose == Purpose::kOpenData && fs::is_directory(data_folder_, ignored))
-    folder_ = data_folder_;
-  enter(folder_.empty() ? fs::current_path(ignored) : folder_);
+  const fs::path& last = purpose == Purpose::kOpenData ? data_folder_ : work_folder_;
+  enter(fs::is_directory(last, ignored) ? last : fs::current_path(ignored));
   select({});
   name_ = name;
 }
@@ -215,9 +213,8 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   if (chosen) {
     std::error_code ignored;
     const fs::path from = chosen->files.front().parent_path();
-    if (fs::is_directory(from, ignored))
-      (look.saves ? save_folder_ : open_folder_) = from;  // also of a typed path
-    if (chosen->purpose == Purpose::kOpenData) data_folder_ = from;
+    if (fs::is_directory(from, ignored))  // also of a typed path
+      (chosen->purpose == Purpose::kOpenData ? data_folder_ : work_folder_) = from;
   }
   if (cancels || chosen) {
     ImGui::CloseCurrentPopup();

@@ -70,7 +70,7 @@ class FileDialog {
     data_endings_.emplace_back(".splats");
   }
 
-  /// Opens it with the next draw(), in the folder from which a file was opened last, or to which one was saved. `name`: the one that is offered.
+  /// Opens it with the next draw(), in the folder that was used last for data, or for all other files. `name`: the one that is offered.
   void open(Purpose purpose, const std::string& name = "");
   /// The same, to save a picture; `size` is offered, and can be changed. `text_pixels`: the height of its texts then.
   void openToSavePicture(const std::string& name, ImageSize size, double text_pixels);
@@ -102,8 +102,8 @@ class FileDialog {
   bool opens_ = false;
   int frames_to_focus_ = 0;  // at most: what is typed waits until the name has the focus
   bool all_files_ = false, help_ = false;
-  std::filesystem::path data_folder_;                // from which data were opened last
-  std::filesystem::path open_folder_, save_folder_;  // of the last files
+  std::filesystem::path data_folder_;  // from which data were opened last
+  std::filesystem::path work_folder_;  // of pictures, films and states that were saved or opened last
   std::filesystem::path folder_;
   std::vector<FolderEntry> entries_;
   std::vector<std::string> taken_;  // names that were clicked
