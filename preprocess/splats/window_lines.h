@@ -82,7 +82,7 @@ class WindowLines {
   JointLine lineOf(const NodeOnLine& node, const CellLengths& cells, const SquaredExtents& extents) const;
   /// The cells along an axis around node (i, j, k), at element `at`.
   CellLengths cellsAlong(size_t axis, const std::array<uint64_t, 3>& ijk, ptrdiff_t at) const;
-  /// Which nodes of a row have all that stretchNodes() needs of the block: those from `first` to `last` - 1, if no blank node is near.
+  /// Finds the nodes of a row that have all that stretchNodes() needs of the block: `first` to `last` - 1, if no blank node is near.
   struct InnerPart {
     uint64_t first, last;
     bool any_blank;
