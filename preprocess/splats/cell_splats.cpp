@@ -135,7 +135,7 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
   if (in_box_j) measureRow(j, k, 2);
 }
 
-/// The extents of a row's cells along one axis: the mean of four edges, and of it what lies across the faces (CellWidths).
+/// The extents of a row's cells along one axis: those of the mean of four edges, by widths as far as it reaches across the faces.
 void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
   const std::array<size_t, 3> strides{1, row_stride_, plane_stride_};
   const size_t along = strides[axis], across = strides[(axis + 1) % 3], other = strides[(axis + 2) % 3];
@@ -153,11 +153,9 @@ void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
       return glm::dvec3(of(x), of(y), of(z));
     };
     const glm::dvec3 own = edges(along, across, other);
-    out[i] = glm::dot(own, own);
-    if (!by_widths_) continue;
-    const glm::dvec3 normal = glm::cross(edges(across, other, along), edges(other, along, across));
-    const double area = glm::dot(normal, normal), volume = glm::dot(own, normal);
-    if (area > 0) out[i] = volume * volume / area;
+    glm::dvec3 normal(0.0);
+    if (by_widths_) normal = glm::cross(edges(across, other, along), edges(other, along, across));
+    out[i] = squaredAcross(own, normal);
   }
 }
 

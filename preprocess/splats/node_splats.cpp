@@ -351,8 +351,9 @@ inline void NodeWindow::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neig
                             lattice_.position(at + neighbours.before[axis]));
 
   // Where the middle of the cell is from the node along its columns, in cells. The cell reaches half way to
-  // either neighbour, at distances a and b across its faces: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one
-  // neighbour only, that is a quarter of the difference, inwards, of the splat's length: its border stays.
+  // either neighbour, at distances a and b across its faces: its middle is (b - a) / 4 away, of a length of
+  // (a + b) / 2. With one neighbour only, that is a quarter of the difference, inwards, of the splat's length:
+  // its border stays.
   glm::dvec3 middle(0.0);
   glm::dvec3 bend(0.0);             // the sum of the positions' second differences
   glm::dvec3 aside(0.0);            // from the node to the cell's middle, across the columns

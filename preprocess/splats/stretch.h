@@ -28,6 +28,7 @@
 // growth: the smaller of the two growths next to the end, 1 where they disagree or the line is short.
 #pragma once
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include <algorithm>
@@ -130,6 +131,12 @@ struct NodePositions {
   }
 };
 
+/// The square of how long `way` is along `normal`, which may have any length; of the whole of `way` if it has none.
+inline double squaredAcross(const glm::dvec3& way, const glm::dvec3& normal) {
+  const double area = glm::dot(normal, normal), volume = glm::dot(way, normal);
+  return area > 0 ? volume * volume / area : glm::dot(way, way);
+}
+
 /// How long the cells around a node are along a grid line: as far as they reach across the faces of the node's own cell. It is the
 /// length along the line where lines cross at right angles. Where layers are sheared, as over mountains, the line lengthens from
 /// cell to cell, and the cells do not.
@@ -143,10 +150,8 @@ struct CellLengths {
   double squared(ptrdiff_t from, ptrdiff_t to) const {
     const glm::dvec3 way(nodes.x[to] - nodes.x[from], nodes.y[to] - nodes.y[from],
                          nodes.z[to] - nodes.z[from]);
-    const double area = dotOf(normal, normal), volume = dotOf(way, normal);
-    return area > 0 ? volume * volume / area : dotOf(way, way);
+    return squaredAcross(way, normal);
   }
-  static double dotOf(const glm::dvec3& a, const glm::dvec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 };
 
 /// Nodes that follow one another in memory, each with three neighbours on either side along an axis, and one along the others.

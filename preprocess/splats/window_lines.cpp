@@ -85,18 +85,11 @@ CellLengths WindowLines::cellsAlong(size_t axis, const std::array<uint64_t, 3>& 
   return {nodes, glm::cross(difference((axis + 1) % 3), difference((axis + 2) % 3))};
 }
 
-namespace {
-
-constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
-
-}  // namespace
-
 WindowLines::InnerPart WindowLines::innerPart(size_t axis, uint64_t j, uint64_t k) const {
   const auto is_inner = [](uint64_t index, uint64_t count, uint64_t reach) {
     return index >= reach && index + reach < count;
   };
-  const auto reach = [&](size_t along) -> uint64_t { return along == axis ? kWhole : by_widths_ ? 1 : 0; };
-  const uint64_t of_i = reach(0), of_j = reach(1), of_k = reach(2);
+  const uint64_t of_i = reach(0, axis), of_j = reach(1, axis), of_k = reach(2, axis);
   if (!is_inner(j, in_.block.nj, of_j) || !is_inner(k, in_.block.nk, of_k)) return {i1_, i1_, false};
   InnerPart part{std::min(i1_, std::max(of_i, i0_)), 0, false};
   part.last = std::max(part.first, std::min(ni_ - std::min(ni_, of_i), i1_));
@@ -109,8 +102,8 @@ WindowLines::InnerPart WindowLines::innerPart(size_t axis, uint64_t j, uint64_t 
 void WindowLines::markBlanksAlong(size_t axis, ptrdiff_t row, uint64_t first, uint64_t last) const {
   clearMarks(first, last);
   for (size_t along = 0; along < 3; ++along) {
-    const ptrdiff_t reach = along == axis ? static_cast<ptrdiff_t>(kWhole) : by_widths_ ? 1 : 0;
-    for (ptrdiff_t n = -reach; n <= reach; ++n) markBlanks(row + n * strides_[along], first, last);
+    const auto most = static_cast<ptrdiff_t>(reach(along, axis));
+    for (ptrdiff_t n = -most; n <= most; ++n) markBlanks(row + n * strides_[along], first, last);
   }
 }
 
@@ -185,7 +178,7 @@ JointLine WindowLines::lineOf(const NodeOnLine& node, const CellLengths& cells,
                   to = node.at + (has_after ? node.stride : 0);
   const double extent = glm::length(lattice_.position(to) - lattice_.position(from));
   if (const double width = cells.squared(from, to); width > 0 && by_widths_) {
-    // As long as the cells were if all were sheared as this node's: the splat's axis lies along the line.
+    // Each cell gets the length that it would have if it were sheared as this node's: the splat's axis lies along the line.
     for (double& squared : row) squared *= extent * extent / width;
   }
   return JointLine::ofExtents(row, 0.5 * extent);

@@ -88,6 +88,10 @@ class WindowLines {
     bool any_blank;
   };
   InnerPart innerPart(size_t axis, uint64_t j, uint64_t k) const;
+  /// The neighbours on a side, along one of the axes, that stretchNodes() needs for the cells along `axis`.
+  uint64_t reach(size_t along, size_t axis) const {
+    return along == axis ? kStretchReach - 1 : by_widths_ ? 1 : 0;
+  }
   /// Marks the nodes for which one of those that stretchNodes() needs is blank.
   void markBlanksAlong(size_t axis, ptrdiff_t row, uint64_t first, uint64_t last) const;
   NodeOnLine onLine(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;

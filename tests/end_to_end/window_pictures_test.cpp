@@ -298,7 +298,7 @@ class WindowMovie : public WindowTest {
   }
 };
 
-/// Usually 12 pictures in the place of 90.
+/// The film has 12 pictures by default, and 90 with tools/test.sh --whole.
 TEST_F(WindowMovie, OnceAroundIsWhatRenderDraws) {
   open({"--scalar", "volume"}, {480, 360});
   press("h");  // without the panels

@@ -100,8 +100,8 @@ class CacheView {
 
   /// The settings of this view that another view of the same grid takes over: all but those that name scalars which the
   /// other's cache does not have. nullptr if this is a preview that the user has left as it was.
-  bool isDark() const { return state_.dark; }
   std::shared_ptr<const CarriedView> carriedTo(const PreparedView& next) const;
+  bool isDark() const { return state_.dark; }
   const std::optional<Preview>& preview() const { return preview_; }
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }
   /// A scalar that the cache lacks, once: one that hasElsewhere(), or one of the sources, to be added. `is_busy`: something is being opened or added; then it
