@@ -52,7 +52,7 @@ class Cells {
         out_(out) {
     scratch_.centre.resize((known_i1_ - known_i0_) * rowsOf(known_));
     scratch_.there.resize(scratch_.centre.size());
-    for (auto& extent : scratch_.extent) extent.resize(scratch_.centre.size());
+    for (auto& edge : scratch_.edge) edge.resize(scratch_.centre.size());
     for (uint64_t k = known_.k0; k < known_.k1; ++k)
       for (uint64_t j = known_.j0; j < known_.j1; ++j) lookAtRow(j, k);
   }
@@ -135,56 +135,51 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
   if (in_box_j) measureRow(j, k, 2);
 }
 
-/// The extents of a row's cells along one axis: those of the mean of four edges, by widths as far as it reaches across the faces.
+/// The edges of a row's cells along one axis.
 void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
   const std::array<size_t, 3> strides{1, row_stride_, plane_stride_};
   const size_t along = strides[axis], across = strides[(axis + 1) % 3], other = strides[(axis + 2) % 3];
   const size_t node = nodeAt(known_i0_, j, k);
-  const double *x = in_.nodes->x.data() + node, *y = in_.nodes->y.data() + node,
-               *z = in_.nodes->z.data() + node;
-  double* out = scratch_.extent[axis].data() + cellAt(known_i0_, j, k);
+  glm::dvec3* out = scratch_.edge[axis].data() + cellAt(known_i0_, j, k);
   for (size_t i = 0; i < known_i1_ - known_i0_; ++i) {
-    const auto edges = [&](size_t step, size_t beside, size_t above) {
-      const auto of = [&](const double* a) {
-        const double* b = a + step;
-        return ((b[i] - a[i]) + (b[i + beside] - a[i + beside])) +
-               ((b[i + above] - a[i + above]) + (b[i + beside + above] - a[i + beside + above]));
-      };
-      return glm::dvec3(of(x), of(y), of(z));
+    const auto of = [&](const std::vector<double>& positions) {
+      const double *a = positions.data() + node + i, *b = a + along;
+      return ((b[0] - a[0]) + (b[across] - a[across])) +
+             ((b[other] - a[other]) + (b[across + other] - a[across + other]));
     };
-    const glm::dvec3 own = edges(along, across, other);
-    glm::dvec3 normal(0.0);
-    if (by_widths_) normal = glm::cross(edges(across, other, along), edges(other, along, across));
-    out[i] = squaredAcross(own, normal);
+    out[i] = {of(in_.nodes->x), of(in_.nodes->y), of(in_.nodes->z)};
   }
 }
 
 /// The stretch of a cell, number `index` of `count` along the axis; `stride` is from one to the next in the
-/// scratch.
+/// scratch. Lengths are those of CellLengths, of edges.
 Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const {
   const auto is_there = [&](uint64_t before, uint64_t after) {
     return index >= before && index + after < count &&
            scratch_.there[cell + after * stride - before * stride];
   };
   if (!corrections_.stretch || is_there(1, 0) + is_there(0, 1) == 0) return {};
-  const double* own = scratch_.extent[axis].data() + cell;
+  const auto& edge = scratch_.edge;
+  glm::dvec3 normal(0.0);
+  if (by_widths_) normal = glm::cross(edge[(axis + 1) % 3][cell], edge[(axis + 2) % 3][cell]);
+  const auto before = [&](size_t steps) { return squaredAcross(edge[axis][cell - steps * stride], normal); };
+  const auto after = [&](size_t steps) { return squaredAcross(edge[axis][cell + steps * stride], normal); };
+  const double own = before(0);
   if (!is_there(1, 0)) {
     if (!is_there(0, 2)) return {};
-    const double near = own[stride], far = own[2 * stride], steady = steadyGrowth(*own, near, far);
-    return {1,
-            stretchOf(*own / (steady * steady), *own / steady, *own, near, far, StretchFit::kGentle).growth};
+    const double near = after(1), far = after(2), steady = steadyGrowth(own, near, far);
+    return {1, stretchOf(own / (steady * steady), own / steady, own, near, far, StretchFit::kGentle).growth};
   }
   if (!is_there(0, 1)) {
     if (!is_there(2, 0)) return {};
-    const double near = *(own - stride), far = *(own - 2 * stride), steady = steadyGrowth(*own, near, far);
-    return {1,
-            stretchOf(far, near, *own, *own / steady, *own / (steady * steady), StretchFit::kGentle).growth};
+    const double near = before(1), far = before(2), steady = steadyGrowth(own, near, far);
+    return {1, stretchOf(far, near, own, own / steady, own / (steady * steady), StretchFit::kGentle).growth};
   }
-  const double before = *(own - stride), after = own[stride];
+  const double before1 = before(1), after1 = after(1);
   // Beyond the last cell is its mirror image, less the steady growth.
-  const double before2 = is_there(2, 0) ? *(own - 2 * stride) : before / steadyGrowth(before, *own, after);
-  const double after2 = is_there(0, 2) ? own[2 * stride] : after / steadyGrowth(after, *own, before);
-  return stretchOf(before2, before, *own, after, after2, StretchFit::kGentle);
+  const double before2 = is_there(2, 0) ? before(2) : before1 / steadyGrowth(before1, own, after1);
+  const double after2 = is_there(0, 2) ? after(2) : after1 / steadyGrowth(after1, own, before1);
+  return stretchOf(before2, before1, own, after1, after2, StretchFit::kGentle);
 }
 
 /// A length for the shape of a cell without any extent: far below the grid's, and above zero.

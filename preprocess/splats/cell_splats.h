@@ -39,7 +39,7 @@ inline constexpr Halo kCellSplatHalo{2, 3};
 struct CellScratch {
   std::vector<glm::dvec3> centre;
   std::vector<uint8_t> there;
-  std::array<std::vector<double>, 3> extent;  // along i, j, k: 16 times the cell's squared width
+  std::array<std::vector<glm::dvec3>, 3> edge;  // along i, j, k: the sum of the cell's four edges
 };
 
 /// Computes the splats of the cells whose lowest nodes are in `box`, except for cells with a blanked corner

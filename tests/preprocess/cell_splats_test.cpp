@@ -380,6 +380,22 @@ TEST(CellSplats, OfUnevenCellsAreStretchedByTheirNeighbours) {
   }
 }
 
+TEST(CellSplats, OfSteepTerrainLieInTheirMiddles) {
+  // Layers over hills, the flatter the higher. Each column has cells of one height, but their layers come closer together as they get
+  // steep: fitted to how far each is across its own faces, splats drifted, and an even medium looked mottled by 2.5 %.
+  CellBlock grid(13, 12, 11, [](double i, double j, double k) {
+    return glm::dvec3(i, j, 4 * std::sin(0.9 * i) * std::cos(0.8 * j) * (1 - k / 12) + 0.5 * k);
+  });
+  grid.addCellScalar([](const glm::dvec3& p) { return p.x; });
+  const NodeSplats out = grid.cellSplats();
+  ASSERT_EQ(out.splats.size(), 12u * 11 * 10);
+  for (const NodeSplat& splat : out.splats) {
+    EXPECT_LT(glm::distance(splat.splat.position, splat.node_position), 1e-9) << splat.node;
+    EXPECT_NEAR(splat.splat.axis[0] * splat.splat.axis[1] * splat.splat.axis[2], splat.splat.weight, 1e-9)
+        << splat.node;
+  }
+}
+
 TEST(CellSplats, WhoseMiddlesNearlyCoincideStayAmongTheSamples) {
   // Every second cell is folded back over the one before it.
   CellBlock zigzag(8, 4, 4,
