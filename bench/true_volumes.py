@@ -67,6 +67,13 @@ def determinant(terms, u, v, w):
     return np.abs(sum(x_u[n] * (x_v[n - 2] * x_w[n - 1] - x_v[n - 1] * x_w[n - 2]) for n in range(3)))
 
 
+def halves(corners):
+    """[part of 8 * cell, corner of 8, 3]: the cells' parts, by their own trilinear maps."""
+    terms = coefficients(corners)
+    return np.concatenate([np.stack([trilinear(terms, *((part >> axis & 1) / 2 + (c >> axis & 1) / 2 for axis in range(3))).T
+                                     for c in range(8)], axis=1) for part in range(8)])
+
+
 def drawn_cells(xyz, values):
     """Corners of the cells that are drawn (those without NaN), and the values at them (or theirs). A mesh comes as such corners."""
     if xyz.ndim == 3:
@@ -105,13 +112,14 @@ def axes_of(view):
 
 def depths_of(blocks, middle, scale, points):
     """The volume that lies behind each square of the picture, of each view: points in all cells, about as many as the cell has of the
-    volume, each with its share of it. They are those of a sequence of low discrepancy, which each cell begins elsewhere, so that the
+    volume, each with its share of it; in halves of a few large cells. They are those of a sequence of low discrepancy, which each cell begins elsewhere, so that the
     points of many cells do not line up."""
     at_once = 1 << 16
     count = PIXELS // BLOCK
     sums = {view: np.zeros(count * count) for view in VIEWS}
     to_squares = np.concatenate([axes_of(view)[:2] for view in VIEWS]) * count / (2 * scale)
-    terms = np.concatenate([coefficients(drawn_cells(xyz, values)[0]) for xyz, values in blocks], axis=-1)
+    cells = np.concatenate([drawn_cells(xyz, values)[0] for xyz, values in blocks])
+    terms = coefficients(halves(cells) if len(cells) < 10_000 else cells)
     volume = determinant(terms, 0.5, 0.5, 0.5)
     halvings = np.rint(np.log2(np.maximum(points * volume / volume.sum(), 64))).astype(int)
     begin = np.random.default_rng(1).random((3, len(volume), 1))

@@ -156,6 +156,31 @@ std::vector<std::array<uint8_t, 3>> nodesOf(CellKind shape, CellCurve curve) {
   return places;
 }
 
+const std::vector<std::vector<uint8_t>>& middlesOf(CellKind shape) {
+  using Middles = std::vector<std::vector<uint8_t>>;
+  static const std::map<CellKind, Middles> known = [] {
+    std::map<CellKind, Middles> middles;
+    for (const CellKind kind :
+         {CellKind::kTetrahedron, CellKind::kPyramid, CellKind::kWedge, CellKind::kHexahedron}) {
+      const std::vector<Place> places = nodesOf(kind, kHalved);
+      const size_t corners = cornersOf(kind);
+      for (size_t n = corners; n < places.size(); ++n) {
+        std::vector<uint8_t>& between = middles[kind].emplace_back();
+        // Each of them has an opposite one, which may be of the same edge, face or cell.
+        for (size_t corner = 0; corner < corners; ++corner)
+          for (size_t opposite = 0; opposite < corners; ++opposite) {
+            bool is_middle = true;
+            for (size_t axis = 0; axis < 3; ++axis)
+              is_middle &= places[corner][axis] + places[opposite][axis] == 2 * places[n][axis];
+            if (is_middle) between.push_back(static_cast<uint8_t>(corner));
+          }
+      }
+    }
+    return middles;
+  }();
+  return known.at(shape);
+}
+
 void appendCurved(CellKind shape, std::span<const uint64_t> nodes, MeshCells& out) {
   if (nodes.size() <= cornersOf(shape)) return out.append(shape, nodes);
   out.appendCurved(shape, curveOf(shape, nodes.size()), nodes);

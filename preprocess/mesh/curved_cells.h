@@ -29,6 +29,13 @@ CellCurve curveOf(CellKind shape, size_t nodes);
 /// a pyramid i and j are the order less k at most. VTK has no pyramids above order 2: their nodes come by layers.
 std::vector<std::array<uint8_t, 3>> nodesOf(CellKind shape, CellCurve curve);
 
+/// A linear cell has the nodes of this one in the middles of its edges, of its faces with four corners, and in its own; its parts are
+/// half as long.
+inline constexpr CellCurve kHalved{.order = 2, .layers = 2};
+
+/// [node behind the corners]: the corners that it is the middle of, in a linear cell. Made once. Thread-safe.
+const std::vector<std::vector<uint8_t>>& middlesOf(CellKind shape);
+
 /// Appends a cell with its nodes in VTK's order: one of higher order if it has more of them than corners. If there is no such one, its
 /// corners.
 void appendCurved(CellKind shape, std::span<const uint64_t> nodes, MeshCells& out);

@@ -62,9 +62,10 @@ ReachingSample sampleOf(const CacheReader& reader, std::span<const NodeRun> runs
         throw Error("{}: is damaged: a brick has nodes of block {}, and there are {}", reader.path().string(),
                     run.block + 1, manifest.blocks.size());
       const std::array<uint64_t, 3> index{run.i + (splat - first), run.j, run.k};
+      if (manifest.isMesh()) return {run.block, index[0], index[1], 0};
       const auto [i, j, k] = manifest.cells ? manifest.refinement.cellInFiles(run.block, index)
                                             : manifest.refinement.nodeInFiles(run.block, index);
-      return {run.block, i, j, manifest.isMesh() ? 0 : k};
+      return {run.block, i, j, k};
     }
     first += run.count;
   }

@@ -19,7 +19,8 @@ struct ProbeVariable {
 };
 
 /// A sample of a block whose splat reaches a point, with its indices in the files' grid. Where the conversion
-/// cut cells (Refinement), it is the nearest node, or the cell that was cut. `distance`: as in ProbeResult.
+/// cut cells (Refinement), it is the nearest node, or the cell that was cut; of an unstructured grid, the one of the cut grid.
+/// `distance`: as in ProbeResult.
 struct ReachingSample {
   uint32_t block = 0;
   uint64_t i = 0, j = 0, k = 0;

@@ -410,18 +410,40 @@ TEST_F(RefineCommand, AllStepsAreCutByTheNeedOfTheFirst) {
   EXPECT_TRUE(filesOf(folder_ / "some.splats") == filesOf(folder_ / "all.splats"));
 }
 
-TEST_F(RefineCommand, RefusesWhatCannotBeRefined) {
-  writeFileAtomically(folder_ / "tetrahedron.vtk",
+TEST_F(RefineCommand, HalvesCellsOfUnstructuredGrids) {
+  // Two tetrahedra, the second of three times the volume.
+  writeFileAtomically(folder_ / "pair.vtk",
                       "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n"
-                      "POINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n"
-                      "POINT_DATA 4\nSCALARS s float\nLOOKUP_TABLE default\n1 2 3 4\n");
-  const auto convert_it = [&](const char* parts) {
-    return Words{"convert", file("tetrahedron.vtk"), "-o", file("t.splats"), "--refine", parts};
+                      "POINTS 5 float\n0 0 0 1 0 0 0 1 0 0 0 1 0 0 -3\nCELLS 2 10\n4 0 1 2 3\n4 0 2 1 4\n"
+                      "CELL_TYPES 2\n10\n10\nPOINT_DATA 5\nSCALARS s float\nLOOKUP_TABLE default\n1 2 3 4 5\n"
+                      "SCALARS t float\nLOOKUP_TABLE default\n2 4 6 8 10\n");
+  const auto convert_it = [&](const std::string& cache, const Words& more) {
+    return Words{"convert", file("pair.vtk"), "-o", file(cache), "--scalar", "s"} + more;
   };
-  expectRefused(convert_it("2"), 1, {"--refine is for structured grids"});
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "t.splats"));
-  run(convert_it("1"));
-  run(convert_it("auto") + Words{"--overwrite"});
+  const ProgramResult by_need = runProgram(convert_it("auto.splats", {}));
+  expectSays(by_need.err,
+             "cells beside larger or smaller ones are halved along each edge; --refine 1 leaves them whole");
+  run(convert_it("1.splats", {"--refine", "1"}));
+  run(convert_it("4.splats", {"--refine", "4"}));
+  EXPECT_FALSE(manifest("1.splats").contains("refined"));
+  EXPECT_EQ(manifest("1.splats")["nodes"], 5);
+  EXPECT_EQ(manifest("auto.splats")["refined"], 2);
+  EXPECT_EQ(manifest("auto.splats")["nodes"], 14) << "and the middles of nine edges";
+  EXPECT_EQ(manifest("4.splats")["refined"], 4);
+  for (const char* const cache : {"auto.splats", "4.splats"})
+    EXPECT_NEAR(manifest(cache)["volume"].get<double>(), 4.0 / 6, 1e-4) << cache;
+
+  run({"convert", file("pair.vtk"), "--add-scalar", "t", "--to", file("auto.splats")});
+  EXPECT_EQ(manifest("auto.splats")["variables"].size(), 2);
+  const std::string of_cut = runProgram({"info", file("auto.splats"), "--probe", "0.2,0.2,0.2"}).out;
+  expectSays(of_cut, "of the cut mesh");
+  expectSays(runProgram({"info", file("auto.splats"), "--probe", "0.25,0.25,0.25", "--source"}).out,
+             "2.5 at the point");
+  expectRefused(convert_it("3.splats", {"--refine", "3"}), 1, {"are cut into 2, 4, 8 or 16 parts"});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "3.splats"));
+}
+
+TEST_F(RefineCommand, RefusesWhatCannotBeRefined) {
   for (const char* const parts : {"0", "17", "x", "2x", ""}) {
     const ProgramResult result = runProgram(convert("no.splats", {"--refine", parts}));
     EXPECT_EQ(result.status, 2);

@@ -218,7 +218,7 @@ class Columns(MeshFormats):
         self.assertEqual([self.info(self.path, mesh)["scalars"][0][word] for word in ("name", "min", "max")], ["u", 7, 7])
         area = 6371 ** 2 * np.radians(1) * 2 * np.sin(np.radians(0.5)) / 2  # of a triangle, to a permille
         self.assertAlmostEqual(self.volume([self.path, mesh], "u") / (area * (100 + 10) / 1000), 1, delta=2e-3)
-        manifest = self.manifest(self.convert([self.path, mesh], "temp", "--vertical-scale", "100"))
+        manifest = self.manifest(self.convert([self.path, mesh], "temp", "--vertical-scale", "100", "--refine", "1"))
         # 16 points, of which 3 are below the bottom and 2 in no cell above it.
         self.assertEqual((manifest["splats"], manifest["blanked_nodes"], manifest["variables"][0]["min"]), (11, 3, 9))
 

@@ -11,6 +11,7 @@
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
+#include "preprocess/formats/common/halved_mesh.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
@@ -87,7 +88,9 @@ class MeshAddition : public testing::Test {
   }
 
   void expectAddition(std::vector<ArrayPiece> pieces, bool cells) {
-    const TwoOfEach source(std::move(pieces));
+    expectAddition(TwoOfEach(std::move(pieces)), cells);
+  }
+  void expectAddition(const MeshSource& source, bool cells) {
     const uint32_t first = cells ? 1 : 0, second = cells ? 3 : 2;
     const auto both = convertAt(source, fmt::format("both{}", ++number_), {first, second});
     const auto added = convertAt(source, fmt::format("added{}", number_), {first});
@@ -165,6 +168,14 @@ TEST_F(MeshAddition, AScalarAddedLaterIsTheOneConvertedAtOnce) {
     expectAddition({shuffled(tetrahedra_, 5)}, cells);
     expectAddition(split(hexahedra_, 3, [](size_t cell) { return cell / 50 % 3; }), cells);
   }
+}
+
+TEST_F(MeshAddition, HalvesOfCellsAreTheSameAgain) {
+  for (const bool cells : {false, true})
+    for (const std::vector<ArrayPiece>& pieces : {std::vector{shuffled(tetrahedraOf(*scene_, 5, 3, 2), 5)},
+                                                  std::vector{unitBox(0, 2), unitBox(1, 4)}})
+      expectAddition(*halved(std::make_unique<TwoOfEach>(pieces)), cells);
+  EXPECT_EQ(CacheReader(folder_ / "added1").manifest().refinement, Refinement(2));
 }
 
 TEST_F(MeshAddition, CellsOfOneLayerAreTwoSplatsEachAgain) {

@@ -321,7 +321,7 @@ void addConvert(CLI::App& app) {
       ->add_option("--refine", arguments->refine,
                    "Cut each cell into N x N x N by its own trilinear map; 1: leave cells as they are. auto: "
                    "only where cells grow or bend steeply from one to the next, along the axes that need it, "
-                   "into 2, 4 or 8 parts (default: auto)")
+                   "into 2, 4 or 8 parts; small unstructured grids are halved as a whole (default: auto)")
       ->type_name("N|auto")
       ->check([](const std::string& text) {
         parseRefinement("--refine", text);

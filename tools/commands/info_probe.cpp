@@ -85,10 +85,11 @@ void printPoint(std::span<const CacheReader> readers, const Probe& probe) {
     return;
   }
   const Manifest& manifest = readers.front().manifest();
-  const char* const sample = manifest.cells ? "cell" : "node";
+  const bool is_cut = !probe.of_source && manifest.refinement.cutsCells();
+  const std::string sample = fmt::format("{}{}", manifest.cells ? "cell" : "node",
+                                         is_cut && manifest.isMesh() ? " of the cut mesh" : "");
   const std::string block = manifest.blocks.size() > 1 ? fmt::format("block {}, ", found->block + 1) : "";
-  const char* const where = !probe.of_source && manifest.refinement.cutsCells()
-                                ? "; the middle of the part of a cell there is"
+  const char* const where = is_cut             ? "; the middle of the part of a cell there is"
                             : !probe.of_source ? ", the middle of whose cell is"
                             : manifest.cells   ? ", whose middle is"
                                                : ",";

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -17,6 +18,7 @@
 #include <system_error>
 #include <utility>
 
+#include "preprocess/formats/common/halved_mesh.h"
 #include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/derived/derived_source.h"
 #include "preprocess/gradients/gradient_mesh.h"
@@ -273,18 +275,30 @@ std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments,
 std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_ptr<DataSource> source,
                                       std::optional<double> blank_value) {
   if (!refinement.cutsCells()) return source;
-  std::unique_ptr<GridSource> grid =
-      requireGrid(std::move(source), "cannot be refined; --refine is for structured grids");
+  const GridDescription& description = source->description();
+  const std::string name = description.files.empty() ? "the grid" : description.files.front();
+  if (auto* const mesh = dynamic_cast<MeshSource*>(source.get())) {
+    const uint32_t parts = refinement.parts();
+    if (!refinement.isUniform() || !std::has_single_bit(parts))
+      throw Error("{}: is an unstructured grid, whose cells are cut into 2, 4, 8 or 16 parts along each edge",
+                  name);
+    source.release();
+    std::unique_ptr<MeshSource> cut(mesh);
+    for (uint32_t n = 1; n < parts; n *= 2) cut = halved(std::move(cut), blank_value);
+    return cut;
+  }
+  std::unique_ptr<GridSource> grid = requireGrid(std::move(source), "cannot be refined");
   const size_t blocks = grid->description().blocks.size();
   if (!refinement.isUniform() && refinement.ofBlocks().size() != blocks)
-    throw Error("{}: has {} blocks; the cells of the cache's {} blocks were cut by --refine auto",
-                grid->description().files.empty() ? "the grid" : grid->description().files.front(), blocks,
-                refinement.ofBlocks().size());
+    throw Error("{}: has {} blocks; the cells of the cache's {} blocks were cut by --refine auto", name,
+                blocks, refinement.ofBlocks().size());
   return refined(std::move(grid), refinement, blank_value);
 }
 
 Refinement refinementByNeed(const DataSource& source, const std::vector<uint32_t>& scalars, unsigned threads,
                             std::optional<double> blank_value) {
+  if (const auto* const mesh = dynamic_cast<const MeshSource*>(&source))
+    return isHalvedByNeed(*mesh) ? Refinement(2) : Refinement();
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   if (!grid) return {};
   const ConversionThreads bound(threadsFor(threads));
@@ -295,6 +309,9 @@ Refinement refinementByNeed(const DataSource& source, const std::vector<uint32_t
 
 std::string noteOnCuts(const GridDescription& description, std::string_view how_to_avoid) {
   if (!description.refinement.cutsCells()) return {};
+  if (!description.pieces.empty())
+    return fmt::format("cells beside larger or smaller ones are halved along each edge; {} leaves them whole",
+                       how_to_avoid);
   uint64_t nodes = 0, in_files = 0;
   for (size_t n = 0; n < description.blocks.size(); ++n) {
     const GridBlock& block = description.blocks[n];
@@ -309,11 +326,11 @@ std::string noteOnCuts(const GridDescription& description, std::string_view how_
 }
 
 std::vector<std::string> notesOnCells(const DataSource& source, const ConvertArguments& arguments) {
-  const auto* const grid = dynamic_cast<const GridSource*>(&source);
-  if (!grid) return {};
   std::vector<std::string> notes;
   if (!arguments.refine)
-    if (std::string note = noteOnCuts(grid->description()); !note.empty()) notes.push_back(std::move(note));
+    if (std::string note = noteOnCuts(source.description()); !note.empty()) notes.push_back(std::move(note));
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  if (!grid) return notes;
   const ConversionThreads bound(threadsFor(arguments.threads));
   if (std::string note = noteOnCells(*grid, arguments.refine.value_or(kByNeed) == kByNeed); !note.empty())
     notes.push_back(std::move(note));

@@ -81,19 +81,19 @@ struct ConvertArguments {
 /// files go to --tmp, or without it beside `cache`.
 std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
 
-/// The source with cells cut as a cache has it. Throws Error if these are cells of an unstructured grid, or of
-/// other blocks.
+/// The source with cells cut as a cache has it. Throws Error if these are cells of other blocks, or of an unstructured grid that
+/// halved() refuses, or not cut into a power of two.
 std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_ptr<DataSource> source,
                                       std::optional<double> blank_value);
 
-/// The refinement by need of a grid (preprocess/survey/cell_bends.h); none of an unstructured one. `threads`: at
-/// most, or 0.
+/// The refinement by need of a grid (preprocess/survey/cell_bends.h), or of an unstructured one
+/// (preprocess/formats/common/halved_mesh.h). `threads`: at most, or 0.
 Refinement refinementByNeed(const DataSource& source, const std::vector<uint32_t>& scalars, unsigned threads,
                             std::optional<double> blank_value);
-/// Says that cells of a structured grid are cut, and that `how_to_avoid` leaves them whole; empty if none are.
+/// Says that cells are cut, and that `how_to_avoid` leaves them whole; empty if none are.
 std::string noteOnCuts(const GridDescription& description, std::string_view how_to_avoid = "--refine 1");
-/// Notes on a structured grid's cells, a line each: that they are cut without having been asked for, and that a
-/// picture will show them. `threads`: as above.
+/// Notes on a grid's cells, a line each: that they are cut without having been asked for, and that a picture of a structured one
+/// will show them. `threads`: as above.
 std::vector<std::string> notesOnCells(const DataSource& source, const ConvertArguments& arguments);
 
 /// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names it

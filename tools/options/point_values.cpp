@@ -207,13 +207,19 @@ OpenSource openSource(const CacheReader& reader, const PointSource& source) {
     opened.ranges.push_back({variable.min, variable.max});
   }
   const DerivedOptions derived{source.gas, std::nullopt};
-  opened.grid = openStepOf(reader.manifest(), options, [&] { return openWithDerived(options, derived); });
+  const auto open = [&] {
+    return openStepOf(reader.manifest(), options, [&] { return openWithDerived(options, derived); });
+  };
+  opened.grid = open();
   const GridDescription& description = opened.grid->description();
   opened.scalars = scalarsLike(reader, description, source.grid);
-  if (dynamic_cast<const MeshSource*>(opened.grid.get()))
-    requireSameSamples(reader, description, source.grid);
-  else
+  const Refinement& refinement = reader.manifest().refinement;
+  if (!dynamic_cast<const MeshSource*>(opened.grid.get()))
     requireSameBlocks(reader, description, source.grid);
+  else if (refinement.cutsCells())
+    requireSameSamples(reader, refinedBy(refinement, open(), std::nullopt)->description(), source.grid);
+  else
+    requireSameSamples(reader, description, source.grid);
   return opened;
 }
 

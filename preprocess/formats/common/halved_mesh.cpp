@@ -1,0 +1,485 @@
+#include "preprocess/formats/common/halved_mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "preprocess/formats/common/cell_nodes.h"
+#include "preprocess/mesh/curved_cells.h"
+#include "preprocess/mesh/forwarding_mesh.h"
+#include "stream/base/error.h"
+#include "stream/base/mutex.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kCellsAtOnce = 4096;
+constexpr size_t kMiddlesAtOnce = size_t{1} << 20, kMiddlesReadAtOnce = 65536;
+
+/// The corners that a new point is the middle of, rising; the rest kNone.
+using Middle = std::array<uint32_t, 8>;
+constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+
+/// Repeated corners count once if all are repeated equally often, as the cells beside such a cell have them.
+Middle middleOf(std::span<const uint8_t> between, std::span<const uint64_t> corners) {
+  Middle middle;
+  middle.fill(kNone);
+  for (size_t n = 0; n < between.size(); ++n) middle[n] = static_cast<uint32_t>(corners[between[n]]);
+  const auto end = middle.begin() + static_cast<ptrdiff_t>(between.size());
+  std::sort(middle.begin(), end);
+  const auto times = std::count(middle.begin(), end, middle[0]);
+  if (times > 1 && std::all_of(middle.begin(), end, [&](uint32_t corner) {
+        return std::count(middle.begin(), end, corner) == times;
+      }))
+    std::fill(std::unique(middle.begin(), end), end, kNone);
+  return middle;
+}
+
+/// Whether it is one of the corners.
+bool isCorner(const Middle& middle) {
+  return middle[1] == kNone;
+}
+
+void sortAndUnite(std::vector<Middle>& middles) {
+  std::sort(middles.begin(), middles.end());
+  middles.erase(std::unique(middles.begin(), middles.end()), middles.end());
+}
+
+bool isHalved(const MeshCells& cells, size_t n) {
+  return cornersOf(cells.shapes[n]) > 0 && (cells.volumes.empty() || !(cells.volumes[n] > 0));
+}
+
+/// Finds points of a piece by their places, to what single precision rounds.
+class PointsByPlace {
+ public:
+  PointsByPlace(const MeshSource& source, uint32_t piece) {
+    const uint64_t count = source.description().pieces[piece].points;
+    std::vector<glm::dvec3> places;
+    MeshPoints points;
+    double largest = 0;
+    for (uint64_t first = 0; first < count; first += kPointsAtOnce) {
+      source.readPoints(piece, first, std::min(kPointsAtOnce, count - first), {}, points);
+      for (size_t n = 0; n < points.x.size(); ++n) {
+        places.emplace_back(points.x[n], points.y[n], points.z[n]);
+        const glm::dvec3 size = glm::abs(places.back());
+        largest = std::max({largest, size.x, size.y, size.z});
+      }
+    }
+    reach_ = largest * std::numeric_limits<float>::epsilon();
+    for (size_t n = 0; n < places.size(); ++n) {
+      const auto [at, is_new] = known_.try_emplace(boxOf(places[n]), static_cast<uint32_t>(n));
+      if (!is_new) at->second = kNone;
+    }
+  }
+
+  /// kNone: none is there, or several, as on the two sides of a thin wall.
+  uint32_t at(const glm::dvec3& place) const {
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 to((corner & 1) != 0 ? reach_ : -reach_, (corner & 2) != 0 ? reach_ : -reach_,
+                          (corner & 4) != 0 ? reach_ : -reach_);
+      if (const auto found = known_.find(boxOf(place + to)); found != known_.end()) return found->second;
+    }
+    return kNone;
+  }
+
+ private:
+  static constexpr uint64_t kPointsAtOnce = 65536;
+  using Box = std::array<int64_t, 3>;
+
+  Box boxOf(const glm::dvec3& place) const {
+    const double edge = reach_ > 0 ? 4 * reach_ : 1;
+    return {std::llround(place.x / edge), std::llround(place.y / edge), std::llround(place.z / edge)};
+  }
+
+  double reach_ = 0;
+  std::map<Box, uint32_t> known_;
+};
+
+/// A part of a cell.
+struct PartShares {
+  double volume = 1;               // in units that all parts have in common
+  std::vector<double> of_corners;  // how much of a value at a corner the part's middle has
+};
+
+/// The shares of all parts of a cell. They are made once. Thread-safe.
+const std::vector<PartShares>& sharesOf(CellKind shape) {
+  static const std::map<CellKind, std::vector<PartShares>> known = [] {
+    std::map<CellKind, std::vector<PartShares>> of_shapes;
+    for (const CellKind kind :
+         {CellKind::kTetrahedron, CellKind::kPyramid, CellKind::kWedge, CellKind::kHexahedron}) {
+      const CellParts& parts = partsOf(kind, kHalved);
+      std::vector<uint64_t> nodes(cornersOf(kind) + middlesOf(kind).size());
+      std::iota(nodes.begin(), nodes.end(), uint64_t{0});
+      MeshCells cells;
+      for (size_t part = 0; part < parts.size(); ++part) {
+        parts.append(part, nodes, cells);
+        const std::span<const uint64_t> at = cells.cornersOfCell(part);
+        // The pyramids in a pyramid have twice the volume of the tetrahedra.
+        const bool is_small = kind == CellKind::kPyramid && cells.shapes[part] == CellKind::kTetrahedron;
+        PartShares& shares = of_shapes[kind].emplace_back(is_small ? 0.5 : 1.0);
+        shares.of_corners.resize(cornersOf(kind));
+        const auto add = [&](size_t corner, size_t among) {
+          shares.of_corners[corner] += 1.0 / static_cast<double>(among * at.size());
+        };
+        for (const uint64_t node : at) {
+          if (node < cornersOf(kind)) {
+            add(node, 1);
+            continue;
+          }
+          const std::vector<uint8_t>& between = middlesOf(kind)[node - cornersOf(kind)];
+          for (const uint8_t corner : between) add(corner, between.size());
+        }
+      }
+    }
+    return of_shapes;
+  }();
+  return known.at(shape);
+}
+
+/// The volume of a cell, without sign: of tetrahedra between its middle, a face's and an edge.
+double volumeOf(CellKind shape, std::span<const glm::dvec3> corners) {
+  glm::dvec3 middle(0.0);
+  for (const glm::dvec3& corner : corners) middle += corner / static_cast<double>(corners.size());
+  const std::span<const uint32_t> faces = facesOf(shape, {});
+  double volume = 0;
+  for (size_t at = 0; at < faces.size(); at += faces[at] + 1) {
+    const auto face = faces.subspan(at + 1, faces[at]);
+    glm::dvec3 of_face = -middle;
+    for (const uint32_t corner : face) of_face += corners[corner] / static_cast<double>(face.size());
+    for (size_t n = 0; n < face.size(); ++n) {
+      const glm::dvec3 a = corners[face[n]] - middle, b = corners[face[(n + 1) % face.size()]] - middle;
+      volume += std::abs(glm::dot(glm::cross(a, b), of_face)) / 6;
+    }
+  }
+  return volume;
+}
+
+/// A piece's new points and parts.
+struct HalvedPiece {
+  std::vector<Middle> middles;  // sorted
+  std::vector<uint32_t>
+      points;  // [middle]: its number in the piece: a new one, or of the point where a node hangs
+  std::vector<size_t> added;        // [new point]: its middle
+  std::vector<uint64_t> begins{0};  // [cell + 1], in the parts
+};
+
+uint64_t cellsOf(const GridDescription& description) {
+  uint64_t cells = 0;
+  for (const MeshPiece& piece : description.pieces) cells += piece.cells;
+  return cells;
+}
+
+/// [point of a piece]: the mean of a scalar in the cells around it.
+using PointMeans = std::vector<float>;
+
+class HalvedMesh final : public ForwardingMesh {
+ public:
+  HalvedMesh(std::unique_ptr<MeshSource> whole, std::optional<double> blank_value)
+      : ForwardingMesh(std::move(whole)) {
+    if (blank_value) blank_value_ = static_cast<float>(*blank_value);
+    const uint64_t cells = cellsOf(description_);
+    if (cells > kMaxHalved)
+      throw Error("{}: has {} cells; unstructured grids of up to {} cells can be refined",
+                  description_.pieces.front().file, cells, kMaxHalved);
+    for (uint32_t piece = 0; piece < description_.pieces.size(); ++piece) pieces_.push_back(measured(piece));
+    for (size_t n = 0; n < pieces_.size(); ++n) {
+      description_.pieces[n].points += pieces_[n].added.size();
+      description_.pieces[n].cells = pieces_[n].begins.back();
+    }
+    description_.refinement = Refinement(2 * description_.refinement.parts());
+    description_.format += fmt::format(", refined {}", textOf(description_.refinement.ofBlock(0)));
+  }
+
+  void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                  MeshPoints& out) const override;
+  void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                 MeshCells& out) const override;
+
+ private:
+  HalvedPiece measured(uint32_t piece) const;
+  void findPoints(uint32_t piece, HalvedPiece& of) const;
+  void readMiddles(uint32_t piece, std::span<const Middle> middles, std::span<const uint32_t> scalars,
+                   MeshPoints& out) const;
+
+  bool hasValue(float value) const { return std::isfinite(value) && value != blank_value_; }
+  std::shared_ptr<const PointMeans> meansOf(uint32_t piece, uint32_t scalar) const;
+  PointMeans computedMeans(uint32_t piece, uint32_t scalar) const;
+  void appendValues(const MeshCells& whole, size_t n, float value, const PointMeans& means,
+                    std::pair<uint64_t, uint64_t> parts, std::vector<float>& out) const;
+
+  std::vector<HalvedPiece> pieces_;
+  std::optional<float> blank_value_;
+  mutable Mutex mutex_;
+  mutable std::map<std::pair<uint32_t, uint32_t>, std::shared_ptr<const PointMeans>> means_
+      GUARDED_BY(mutex_);
+};
+
+HalvedPiece HalvedMesh::measured(uint32_t piece) const {
+  const MeshPiece& whole = source().description().pieces[piece];
+  if (whole.points >= kNone) throw Error("{}: has too many points to be refined", whole.file);
+  HalvedPiece found;
+  std::vector<Middle>& middles = found.middles;
+  size_t united = 0;
+  MeshCells cells;
+  for (uint64_t first = 0; first < whole.cells; first += kCellsAtOnce) {
+    const uint64_t count = std::min(kCellsAtOnce, whole.cells - first);
+    source().readCells(piece, first, count, {}, cells);
+    checkCells(cells, whole, first);
+    for (size_t n = 0; n < count; ++n) {
+      const bool is_halved = isHalved(cells, n);
+      found.begins.push_back(found.begins.back() +
+                             (is_halved ? partsOf(cells.shapes[n], kHalved).size() : 1));
+      if (!is_halved) continue;
+      for (const auto& between : middlesOf(cells.shapes[n]))
+        if (const Middle middle = middleOf(between, cells.cornersOfCell(n)); !isCorner(middle))
+          middles.push_back(middle);
+    }
+    if (middles.size() < united + kMiddlesAtOnce) continue;
+    sortAndUnite(middles);
+    united = middles.size();
+  }
+  sortAndUnite(middles);
+  middles.shrink_to_fit();
+  findPoints(piece, found);
+  return found;
+}
+
+/// Finds the point of each middle: where a node of smaller cells hangs, it is that one.
+void HalvedMesh::findPoints(uint32_t piece, HalvedPiece& of) const {
+  const PointsByPlace known(source(), piece);
+  auto next = static_cast<uint32_t>(source().description().pieces[piece].points);
+  MeshPoints points;
+  for (size_t first = 0; first < of.middles.size(); first += kMiddlesReadAtOnce) {
+    const size_t count = std::min(kMiddlesReadAtOnce, of.middles.size() - first);
+    points = {};
+    readMiddles(piece, std::span(of.middles).subspan(first, count), {}, points);
+    for (size_t n = 0; n < count; ++n) {
+      const uint32_t there = known.at({points.x[n], points.y[n], points.z[n]});
+      if (there == kNone) of.added.push_back(first + n);
+      of.points.push_back(there == kNone ? next++ : there);
+    }
+  }
+}
+
+void HalvedMesh::readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                            MeshPoints& out) const {
+  const uint64_t of_file = source().description().pieces[piece].points;
+  const uint64_t begin = std::min(first, of_file), end = std::min(first + count, of_file);
+  source().readPoints(piece, begin, end - begin, scalars, out);
+  const uint64_t from = std::max(first, of_file) - of_file, to = std::max(first + count, of_file) - of_file;
+  std::vector<Middle> added;
+  for (const size_t middle : std::span(pieces_[piece].added).subspan(from, to - from))
+    added.push_back(pieces_[piece].middles[middle]);
+  readMiddles(piece, added, scalars, out);
+}
+
+/// Appends the points of these middles.
+void HalvedMesh::readMiddles(uint32_t piece, std::span<const Middle> middles,
+                             std::span<const uint32_t> scalars, MeshPoints& out) const {
+  MeshCells around;  // their corners, as those of cells
+  std::vector<uint64_t> corners;
+  for (const Middle& middle : middles) {
+    corners.clear();
+    for (const uint32_t corner : middle)
+      if (corner != kNone) corners.push_back(corner);
+    around.appendCurved(CellKind::kPolyhedron, kHalved, corners);
+  }
+  const CellNodes known(source(), piece, around, scalars, {});
+  std::vector<size_t> order;
+  for (size_t n = 0; n < middles.size(); ++n) {
+    const NodesOfCell nodes = known.of(CellKind::kPolyhedron, kHalved, around.cornersOfCell(n));
+    // In the order of places, so that the sum has the same bits in all pieces.
+    order.resize(nodes.places.size());
+    for (size_t corner = 0; corner < order.size(); ++corner) order[corner] = corner;
+    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+      const glm::dvec3 &p = nodes.places[a], &q = nodes.places[b];
+      return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z);
+    });
+    const double share = 1.0 / static_cast<double>(order.size());
+    glm::dvec3 place(0.0);
+    for (const size_t corner : order) place += nodes.places[corner];
+    out.x.push_back(share * place.x);
+    out.y.push_back(share * place.y);
+    out.z.push_back(share * place.z);
+    out.hidden.push_back(nodes.hidden);
+    for (size_t scalar = 0; scalar < scalars.size(); ++scalar) {
+      double value = 0;
+      bool is_there = true;
+      for (const size_t corner : order) {
+        const double of_corner = nodes.values[corner * scalars.size() + scalar];
+        is_there &= hasValue(static_cast<float>(of_corner));
+        value += of_corner;
+      }
+      out.scalars[scalar].push_back(is_there ? static_cast<float>(share * value) : NAN);
+    }
+  }
+}
+
+void HalvedMesh::readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                           MeshCells& out) const {
+  out.clear();
+  out.scalars.resize(scalars.size());
+  for (std::vector<float>& values : out.scalars) values.clear();
+  if (count == 0) return;
+  const auto& [middles, points, added, begins] = pieces_[piece];
+  const auto cellOf = [&](uint64_t part) {
+    return static_cast<uint64_t>(std::upper_bound(begins.begin(), begins.end(), part) - begins.begin()) - 1;
+  };
+  const uint64_t cell = cellOf(first), end = cellOf(first + count - 1) + 1;
+  MeshCells whole;
+  source().readCells(piece, cell, end - cell, scalars, whole);
+  std::vector<std::shared_ptr<const PointMeans>> means;
+  for (const uint32_t scalar : scalars) means.push_back(meansOf(piece, scalar));
+  std::vector<uint64_t> nodes;
+  for (size_t n = 0; n < whole.size(); ++n) {
+    const bool is_halved = isHalved(whole, n);
+    const CellParts* const parts = is_halved ? &partsOf(whole.shapes[n], kHalved) : nullptr;
+    const uint64_t begin = begins[cell + n], next = begins[cell + n + 1];
+    if ((parts ? parts->size() : 1) != next - begin)
+      throw Error("{}: cell {} is another one than before; the file has been replaced",
+                  description_.pieces[piece].file, cell + n);
+    if (is_halved) {
+      const auto corners = whole.cornersOfCell(n);
+      nodes.assign(corners.begin(), corners.end());
+      for (const auto& between : middlesOf(whole.shapes[n])) {
+        const Middle middle = middleOf(between, corners);
+        const auto found = std::lower_bound(middles.begin(), middles.end(), middle);
+        nodes.push_back(isCorner(middle) ? middle[0] : points[static_cast<size_t>(found - middles.begin())]);
+      }
+    }
+    const std::pair wanted(std::max(first, begin) - begin, std::min(first + count, next) - begin);
+    for (uint64_t part = wanted.first; part < wanted.second; ++part) {
+      if (parts)
+        parts->append(part, nodes, out);
+      else
+        out.appendOf(whole, n);
+      out.hidden.back() = whole.hidden[n];
+      if (!whole.volumes.empty()) out.volumes.push_back(whole.volumes[n]);
+    }
+    for (size_t scalar = 0; scalar < scalars.size(); ++scalar)
+      appendValues(whole, n, whole.scalars[scalar][n], *means[scalar], wanted, out.scalars[scalar]);
+  }
+}
+
+std::shared_ptr<const PointMeans> HalvedMesh::meansOf(uint32_t piece, uint32_t scalar) const {
+  const MutexLock lock(mutex_);
+  auto& known = means_[{piece, scalar}];
+  if (!known) known = std::make_shared<const PointMeans>(computedMeans(piece, scalar));
+  return known;
+}
+
+PointMeans HalvedMesh::computedMeans(uint32_t piece, uint32_t scalar) const {
+  const MeshPiece& whole = source().description().pieces[piece];
+  std::vector<double> sums(whole.points, 0.0);
+  std::vector<uint32_t> counts(whole.points, 0);
+  MeshCells cells;
+  for (uint64_t first = 0; first < whole.cells; first += kCellsAtOnce) {
+    const uint64_t count = std::min(kCellsAtOnce, whole.cells - first);
+    source().readCells(piece, first, count, std::span(&scalar, 1), cells);
+    checkCells(cells, whole, first);
+    for (size_t n = 0; n < count; ++n) {
+      const float value = cells.scalars[0][n];
+      if (cells.hidden[n] != 0 || !hasValue(value)) continue;
+      for (const uint64_t corner : cells.cornersOfCell(n)) {
+        sums[corner] += value;
+        ++counts[corner];
+      }
+    }
+  }
+  PointMeans means(whole.points, 0.0f);
+  for (size_t n = 0; n < means.size(); ++n)
+    if (counts[n] > 0) means[n] = static_cast<float>(sums[n] / counts[n]);
+  return means;
+}
+
+/// Appends the values of the parts [first, second) of cell n.
+void HalvedMesh::appendValues(const MeshCells& whole, size_t n, float value, const PointMeans& means,
+                              std::pair<uint64_t, uint64_t> parts, std::vector<float>& out) const {
+  if (!isHalved(whole, n) || whole.hidden[n] != 0 || !hasValue(value)) {
+    out.insert(out.end(), parts.second - parts.first, value);
+    return;
+  }
+  const std::span<const uint64_t> corners = whole.cornersOfCell(n);
+  const std::vector<PartShares>& shares = sharesOf(whole.shapes[n]);
+  double least = value, most = value, mean = 0, volume = 0;
+  for (const uint64_t corner : corners) {
+    least = std::min<double>(least, means[corner]);
+    most = std::max<double>(most, means[corner]);
+  }
+  std::vector<double> of_parts;
+  for (const PartShares& part : shares) {
+    double of_part = 0;
+    for (size_t corner = 0; corner < corners.size(); ++corner)
+      of_part += part.of_corners[corner] * means[corners[corner]];
+    of_parts.push_back(of_part);
+    mean += part.volume * of_part;
+    volume += part.volume;
+  }
+  mean /= volume;
+  double slope = 1;
+  for (const double of_part : of_parts) {
+    if (value + (of_part - mean) > most) slope = std::min(slope, (most - value) / (of_part - mean));
+    if (value + (of_part - mean) < least) slope = std::min(slope, (least - value) / (of_part - mean));
+  }
+  for (uint64_t part = parts.first; part < parts.second; ++part)
+    out.push_back(static_cast<float>(value + slope * (of_parts[part] - mean)));
+}
+
+}  // namespace
+
+std::unique_ptr<MeshSource> halved(std::unique_ptr<MeshSource> source, std::optional<double> blank_value) {
+  return std::make_unique<HalvedMesh>(std::move(source), blank_value);
+}
+
+bool isHalvedByNeed(const MeshSource& source) {
+  constexpr uint64_t kMaxCells = 30'000;
+  constexpr double kUneven = 0.07;
+  if (cellsOf(source.description()) > kMaxCells) return false;
+  double sum = 0, volume = 0;
+  MeshCells cells;
+  for (uint32_t piece = 0; piece < source.description().pieces.size(); ++piece) {
+    const MeshPiece& whole = source.description().pieces[piece];
+    source.readCells(piece, 0, whole.cells, {}, cells);
+    checkCells(cells, whole, 0);
+    for (size_t n = 0; n < cells.size(); ++n)
+      if (isHalved(cells, n)) cells.curved.emplace_back(n, kHalved);  // so that their corners are read
+    const CellNodes nodes(source, piece, cells, {}, {});
+    std::map<uint64_t, std::pair<double, size_t>> at_points;
+    std::vector<double> volumes(cells.size(), 0.0);
+    for (const auto& [n, curve] : cells.curved) {
+      const std::span<const uint64_t> corners = cells.cornersOfCell(n);
+      volumes[n] = volumeOf(cells.shapes[n], nodes.of(cells.shapes[n], curve, corners).places);
+      for (const uint64_t corner : corners) {
+        at_points[corner].first += volumes[n];
+        ++at_points[corner].second;
+      }
+    }
+    for (const auto& [n, curve] : cells.curved) {
+      double least = std::numeric_limits<double>::infinity(), most = 0;
+      for (const uint64_t corner : cells.cornersOfCell(n)) {
+        const auto& [around, count] = at_points[corner];
+        least = std::min(least, around / static_cast<double>(count));
+        most = std::max(most, around / static_cast<double>(count));
+      }
+      if (!(volumes[n] > 0)) continue;
+      const double growth = std::log(most / least);
+      sum += volumes[n] * growth * growth;
+      volume += volumes[n];
+    }
+  }
+  return sum > kUneven * kUneven * volume;
+}
+
+}  // namespace curvisplat
