@@ -76,6 +76,8 @@ class FileDialog {
   void openToSavePicture(const std::string& name, ImageSize size, double text_pixels);
   /// The same, to save a movie.
   void openToSaveMovie(const std::string& name, MovieOffer offer);
+  /// Opens it again with files that it gave last and that cannot be used, and says why. No effect for others.
+  void openAgain(const std::vector<std::filesystem::path>& files, const std::string& why);
   bool isOpen() const { return purpose_.has_value(); }
   /// Shows the list of the dialog's keys instead of the files, or the files again.
   void toggleHelp() { help_ = !help_; }
@@ -105,6 +107,7 @@ class FileDialog {
   std::filesystem::path data_folder_;  // from which data were opened last
   std::filesystem::path work_folder_;  // of pictures, films and states that were saved or opened last
   std::filesystem::path folder_;
+  std::optional<Chosen> given_;  // last
   std::vector<FolderEntry> entries_;
   std::vector<std::string> taken_;  // names that were clicked
   std::string taken_text_;          // them, as they were put into `name_`
