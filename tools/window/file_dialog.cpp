@@ -126,6 +126,7 @@ void FileDialog::openToSavePicture(const std::string& name, ImageSize size, doub
 }
 
 void FileDialog::openToSaveMovie(const std::string& name, MovieOffer offer) {
+  text_pixels_ = offer.text_pixels;
   open(Purpose::kSaveMovie, name);
   size_ = offer.size;
   offered_size_ = offer.shown;
@@ -164,7 +165,10 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   const float unit = ImGui::GetFontSize();
   ImGui::SetNextWindowSize({std::min(46 * unit, whole.x), std::min(32 * unit, whole.y)}, ImGuiCond_Appearing);
   ImGui::SetNextWindowPos({0.5f * whole.x, 0.5f * whole.y}, ImGuiCond_Appearing, {0.5f, 0.5f});
-  if (!ImGui::BeginPopupModal(look.title)) {
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);  // it is as dark as what lies behind it
+  const bool is_open = ImGui::BeginPopupModal(look.title);
+  ImGui::PopStyleVar();
+  if (!is_open) {
     purpose_.reset();
     return std::nullopt;
   }
@@ -289,7 +293,7 @@ void FileDialog::drawSize() {
   number("picture height", size_.height);
   ImGui::TextUnformatted("pixels");
   nameWidget(fmt::format("picture of {} x {}", size_.width, size_.height));
-  if (*purpose_ == Purpose::kSavePicture) nameWidget(textsOf(size_));
+  nameWidget(textsOf(size_));
   const auto offer = [this](const char* text, ImageSize size) {
     ImGui::SameLine();
     if (ImGui::Button(text)) size_ = size;
@@ -331,6 +335,8 @@ void FileDialog::drawRate() {
   ImGui::TextUnformatted(movie_.chosen_frames > 0 ? fmt::format("pictures in all: {:.1f} s", seconds).c_str()
                                                   : fmt::format("{}: {:.1f} s", pictures, seconds).c_str());
   nameWidget(fmt::format("movie of pictures a second: {}, {:.1f} s", pictures, seconds));
+  ImGui::SameLine();
+  ImGui::TextDisabled("%s", textsOf(size_).c_str());
 }
 
 /// A click takes a name, with Control several; a double click opens.

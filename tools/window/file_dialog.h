@@ -54,6 +54,7 @@ class FileDialog {
   /// Size and rate of a movie, which can be changed.
   struct MovieOffer {
     ImageSize shown{0, 0}, size{0, 0};  // as the window shows it, and to begin with
+    double text_pixels = 0;             // the height of the texts of the first
     double frames_per_s = 25;
     std::function<uint64_t(double frames_per_s)> frames = {};  // how many pictures it has at that rate
     bool has_encoder = true;                                   // ffmpeg, which .mp4 and .gif need
@@ -113,7 +114,7 @@ class FileDialog {
   std::string taken_text_;          // them, as they were put into `name_`
   std::string name_, error_, overwrites_;
   ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture or a movie
-  double text_pixels_ = 0;                     // of a picture of the offered size
+  double text_pixels_ = 0;                     // of one of the offered size
   MovieOffer movie_;
 };
 
