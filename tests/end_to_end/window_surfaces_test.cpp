@@ -321,6 +321,7 @@ TEST_F(WindowSurfaces, EyesHideWhatIsListed) {
   EXPECT_LT(difference(all, none), 40);
   EXPECT_TRUE(hasWidget("remove surface 1"));
   click("eye of surface 1");
+  click("eye of volume");  // the scalar bar goes with it
   moveTo(rest_);
   const Image surface = saveAndCopy();
   const auto commands = close();

@@ -400,6 +400,36 @@ TEST(ViewState, LinesOfTheScalarThatIsDrawnHaveItsFunction) {
   }
 }
 
+TEST(ViewState, AScalarBarIsOfColoursThatSomethingHas) {
+  ViewState state = firstViewOf(manifest(), {300, 200});  // of density
+  const auto titles = [&] {
+    const ShownFunctions functions(state, manifest());
+    std::vector<std::string> all;
+    for (const ShownFunction& shown : functions.bars()) all.push_back(shown.title);
+    return all;
+  };
+  using Titles = std::vector<std::string>;
+  const std::string density = scalarTitle("density", "kg/m3");
+  state.faces = {{"kmin"}};
+  EXPECT_EQ(titles(), Titles{density});
+  state.volume = false;
+  EXPECT_EQ(titles(), Titles{});
+  state.faces_by = FacesScalar{"density", state.function};
+  EXPECT_EQ(titles(), Titles{density});
+  state.faces_by->variable = "u v";
+  ASSERT_EQ(titles().size(), 1u);
+  EXPECT_TRUE(titles()[0].starts_with("u v"));
+  state.faces_by.reset();
+  for (const char* scalar : {"density", "u v"}) {
+    state.isosurfaces = {{scalar, 0.5}};
+    EXPECT_EQ(titles(), Titles{density}) << scalar;
+    state.isosurfaces[0].colour = glm::vec3(1, 0, 0);
+    EXPECT_EQ(titles(), Titles{}) << scalar;
+  }
+  state.slices = {{{{0, 0, 0}, {0, 0, 1}}}};
+  EXPECT_EQ(titles(), Titles{density});
+}
+
 TEST(ViewState, OfAnEarlierVersionHasIsosurfacesOfItsOpacities) {
   auto json = nlohmann::json::parse(toJson(changedState()));
   json.erase("isosurfaces");
