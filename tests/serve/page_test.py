@@ -1008,9 +1008,9 @@ def as_many_clients_as_may_be(browser, caches):
 
 def serves_a_grid(folder):
     os.environ["XDG_CACHE_HOME"] = f"{folder}/kept"
-    with serving(program, [f"{folder}/g.xyz", f"{folder}/g.fun"]) as server:
+    with serving(program, [f"{folder}/annulus.splats", f"{folder}/g.xyz", f"{folder}/g.fun"]) as server:
         names = Viewer(server).hello["caches"]
-        expect(names == ["g"], f"a grid is served as its cache: {names}")
+        expect(names == ["annulus", "g"], f"a grid is served as its cache, beside another one: {names}")
 
 
 def thumbnails(browser, caches):
