@@ -2,6 +2,9 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <numbers>
@@ -10,7 +13,10 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/os.h"
+#include "stream/base/text.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/view/picture_layout.h"
 #include "tools/view/saved_views.h"
 #include "tools/view/view_state.h"
@@ -460,6 +466,24 @@ TEST(ViewState, OfAnEarlierVersionShowsTheIsosurfacesItDrew) {
   json["isovalues"] = {0.5};  // without the volume, and density's own hidden, it drew the other scalar's
   json["isosurfaces"][0]["visible"] = false;
   EXPECT_EQ(shown(json), (std::vector<bool>{false, true, false}));
+}
+
+/// The shell that the command is pasted into finds this program.
+TEST(RenderCommand, BeginsWithTheProgramThatIsRunning) {
+  const TemporaryFolder folder;
+  const std::string path = std::getenv("PATH"), own = shellWord(os::programFile().string());
+  const auto wordWith = [&](const std::string& first) {
+    setenv("PATH", ((folder / first).string() + ":" + path).c_str(), 1);
+    const std::string word = programWord();
+    setenv("PATH", path.c_str(), 1);
+    return word;
+  };
+  for (const char* name : {"none", "same", "other"}) std::filesystem::create_directory(folder / name);
+  std::filesystem::create_symlink(os::programFile(), folder / "same" / "curvisplat");
+  std::ofstream(folder / "other" / "curvisplat") << "another program";
+  EXPECT_EQ(wordWith("none"), own);
+  EXPECT_EQ(wordWith("same"), "curvisplat");
+  EXPECT_EQ(wordWith("other"), own);
 }
 
 TEST(RenderCommand, HasEveryOption) {

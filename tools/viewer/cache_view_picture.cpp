@@ -259,6 +259,7 @@ void CacheView::copyCommand(MovieKind what) {
     const bool of_film = what == MovieKind::kFilm;
     if (of_film && !film_.film()) return;  // its key frames were removed meanwhile
     CommandOptions options{shortPath(preview_ ? preview_->whole : cache_.wholePath()), picture_size_, {}, {}};
+    options.program = programWord();
     ViewState state = state_;
     if (what != MovieKind::kOnePicture) {
       const MovieRequest movie = copiedMovie(what);
