@@ -393,13 +393,14 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
                      of.min, of.max)
              .c_str());
   }
-  // The tick says which of the others it is.
-  if (function.asinhScale()) {
+  bool asinh_scale = function.asinhScale();
+  if (asinh_scale) {
     ImGui::SameLine();
-    ImGui::TextUnformatted("scale: asinh");
-    hint(
-        "Chosen from the data: linear around their middle, logarithmic further out.\n"
-        "Ramp makes it linear, log scale logarithmic.");
+    if (option("asinh scale", asinh_scale)) {
+      function.setLinear();
+      result.changed = true;
+    }
+    hint("chosen from the data: linear around their middle, logarithmic further out");
   }
   nameWidget(fmt::format("scale {}", function.asinhScale() ? "asinh"
                                      : function.logScale() ? "logarithmic"
