@@ -452,8 +452,8 @@ TEST_F(WindowPanels, UndoAndRedo) {
 TEST_F(WindowPanels, SavesSeveralViews) {
   open();
   const Image first = save();
-  moveTo(placeOf("strength", -0.3));  // its label
-  widget("hint how opaque all is");
+  moveTo(placeOf("opacity unit", -0.3));  // its label
+  widget("hint the length over which the opacity accumulates");
   tab("View");
   click("view name");
   act({"type", "a/b view"});  // keys of the window are letters here

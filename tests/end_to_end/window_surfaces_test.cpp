@@ -190,6 +190,8 @@ TEST_F(WindowSurfaces, AnIsosurfaceHasAColourOfItsOwn) {
   click("scalar bar");  // which shows the function's colours
   tab("Objects");
   const Image by_function = saveAndCopy();
+  moveTo(placeOf("isosurface 1 by colours"));
+  EXPECT_TRUE(eventually([] { return hasWidget("hint the colours that f has in the scalar bar"); }));
   click("isosurface 1 by colours");  // it keeps the colour that it has
   EXPECT_GE(difference(saveAndCopy(), by_function), 45);
   click("colour of isosurface 1");
