@@ -67,7 +67,8 @@ TEST_F(WindowStart, TheDialogOpensAZarrStore) {
   close();
 }
 
-/// The grid alone is not enough: the dialog says so, with the grid still chosen. With its solution what was said goes away.
+/// The grid alone is not enough: the dialog says so, with the grid still chosen. With its solution what was said goes away. The folder is
+/// that of the next grid's dialog, also in the next window, and not of pictures.
 TEST_F(WindowStart, ALoneGridAsksForItsSolution) {
   fs::remove_all("both");
   fs::create_directory("both");
@@ -85,6 +86,17 @@ TEST_F(WindowStart, ALoneGridAsksForItsSolution) {
   click("file accept");
   EXPECT_TRUE(eventually([] { return hasWidget("scalar shown: f"); }, 60));
   EXPECT_TRUE(eventually([&] { return !says(); }));
+  click("Save picture as...");
+  placeOf("file both");
+  press("Escape");
+  EXPECT_TRUE(eventually([] { return !hasWidget("file name"); }));
+  close();
+  openEmpty();
+  click("open");
+  placeOf("file a.fun");
+  EXPECT_FALSE(hasWidget("file both"));
+  press("Escape");
+  EXPECT_TRUE(eventually([] { return !hasWidget("file name"); }));
   close();
 }
 
