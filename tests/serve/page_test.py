@@ -292,14 +292,20 @@ def typed_numbers(tab):
     changes(tab, lambda: set_value(tab, "#slices .at", repr(wanted)), "its place")
     expect(abs(tab.run(f"{PAGE}.state.slices[0].point[0]") - wanted) < 1e-9, "it is where the number says")
     expect(tab.run("document.querySelector('#slices .at').previousSibling.previousSibling.textContent") == "x of plane", "the number is of x")
+    x, y = tab.place(".grip")
+    right, down = tab.run("document.querySelector('.grip').along")
+    changes(tab, lambda: tab.drag((x, y), (x + 0.2 * right, y + 0.2 * down)), "its grip", "grip")
+    moved = tab.run(f"{PAGE}.state.slices[0].point[0]") - wanted
+    expect(abs(moved / (0.1 * (upper[0] - lower[0])) - 1) < 0.1, f"the grip follows the mouse: {moved}")
+    changes(tab, lambda: set_value(tab, "#slices .at", repr(wanted)), "its place")
     changes(tab, lambda: set_value(tab, "#slices .triple input:nth-of-type(2)", "1"), "its tilt", "tilted")
     normal = tab.run(f"{PAGE}.state.slices[0].normal")
     expect(max(abs(a - b) for a, b in zip(normal, (0.5 ** 0.5, 0.5 ** 0.5, 0))) < 1e-9, f"a normal of 1, 1, 0: {normal}")
     tab.run("document.getElementById('picture').focus()")
-    for _ in range(3):
+    for _ in range(5):
         tab.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'z', ctrlKey: true }))")
         rest(tab)
-    expect(rest(tab) == before, "Ctrl+Z undoes the tilt, the place and the direction")
+    expect(rest(tab) == before, "Ctrl+Z undoes the tilt, the places and the direction")
     tab.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Z', ctrlKey: true, shiftKey: true }))")
     expect(rest(tab) != before and tab.run(f"{PAGE}.state.slices[0].normal") == [1, 0, 0], "Ctrl+Shift+Z does the first again")
     press(tab, "#slices button:last-of-type")
