@@ -104,11 +104,10 @@ bool usesColours(const SurfaceScene& scene) {
          std::ranges::any_of(
              scene.further_isosurfaces,
              [&](const FurtherIsosurfaces& one) { return has(one.values, one.own_colours); }) ||
-         std::ranges::any_of(
-             scene.grid_surfaces,
-             [](const GridSurface& surface) { return surface.scalar && !surface.colours; }) ||
-         std::ranges::any_of(
-             scene.curves, [](const Curves& one) { return !one.colours && !one.set->values.empty(); });
+         std::ranges::any_of(scene.grid_surfaces,
+                             [](const GridSurface& surface) { return surface.scalar && !surface.colours; }) ||
+         std::ranges::any_of(scene.curves,
+                             [](const Curves& one) { return !one.colours && !one.set->values.empty(); });
 }
 
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,

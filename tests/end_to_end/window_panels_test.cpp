@@ -631,8 +631,9 @@ TEST_F(WindowPanels, CurveAndHistogramAnswerTheMouse) {
 TEST_F(WindowPanels, ValuesOfBothSignsAndALongName) {
   const std::string name = "difference_of_the_pressure_from_its_mean_in_time";
   std::ofstream grid("signed.vtk");
-  grid << "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 6 6 6\nORIGIN 0 0 0\n"
-       << "SPACING 1 1 1\nPOINT_DATA 216\nSCALARS " << name << " float\nLOOKUP_TABLE default\n";
+  grid
+      << "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 6 6 6\nORIGIN 0 0 0\n"
+      << "SPACING 1 1 1\nPOINT_DATA 216\nSCALARS " << name << " float\nLOOKUP_TABLE default\n";
   for (int n = 0; n < 216; ++n) grid << 0.02 * n - 1 << '\n';
   grid.close();
   run({"convert", "signed.vtk", "-o", "signed.splats"});

@@ -112,10 +112,9 @@ void addServe(CLI::App& app) {
   auto arguments = std::make_shared<ServeArguments>();
   CLI::App* command = app.add_subcommand("serve", "Show caches or a grid in a web browser");
   command
-      ->add_option(
-          "CACHE", arguments->caches,
-          "Splat caches, directories NAME.splats; a grid and its solutions are converted into the user's cache "
-          "folder")
+      ->add_option("CACHE", arguments->caches,
+                   "Splat caches, directories NAME.splats; a grid and its solutions are converted into the "
+                   "user's cache folder")
       ->required();
   command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")
       ->check(CLI::Range(0u, 65535u))

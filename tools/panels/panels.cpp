@@ -400,8 +400,8 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   ImGui::SameLine();
   commandOption(Command::kFly, actions, "fly", facts.flies);
   constexpr std::pair<Command, const char*> kSides[]{
-      {Command::kLookPlusX, "+x"},     {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
-      {Command::kLookMinusY, "-y"},    {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
+      {Command::kLookPlusX, "+x"},      {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
+      {Command::kLookMinusY, "-y"},     {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
       {Command::kLookIsometric, "+xyz"}};
   label("look from");
   hint("+x: from the end of the x axis, towards -x; the other keys are alike");

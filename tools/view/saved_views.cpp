@@ -357,8 +357,8 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   for (const std::filesystem::path& file : options.solutions)
     files += fmt::format(" {}", shellWord(file.string()));
   const bool of_film = !options.film.empty(), is_movie = options.turn_frames > 0 || of_film;
-  CommandLine words(fmt::format("{} render {} -o {}", options.program, files,
-                                is_movie ? "movie.mp4" : "picture.png"));
+  CommandLine words(
+      fmt::format("{} render {} -o {}", options.program, files, is_movie ? "movie.mp4" : "picture.png"));
   if (options.precision != ValuePrecision::kAuto) words.add("--value-precision", wordOf(options.precision));
   const int multiple = is_movie ? 2 : 1;  // an .mp4 has an even width and height
   words.add("--size", fmt::format("{}x{}", options.size.width / multiple * multiple,
