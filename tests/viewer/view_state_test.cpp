@@ -434,6 +434,10 @@ TEST(ViewState, AScalarBarIsOfColoursThatSomethingHas) {
   }
   state.slices = {{{{0, 0, 0}, {0, 0, 1}}}};
   EXPECT_EQ(titles(), Titles{density});
+  // The picture stays in its place when the volume comes or goes.
+  const int width = dataSizeOf(state, manifest(), {300, 200}).width;
+  state.volume = true;
+  EXPECT_EQ(dataSizeOf(state, manifest(), {300, 200}).width, width);
 }
 
 TEST(ViewState, OfAnEarlierVersionHasIsosurfacesOfItsOpacities) {
