@@ -136,9 +136,10 @@ struct ScalarBar {
   double width;  // of the strip, whole pixels
 };
 
-/// Pixels from the strip's left edge.
+/// Pixels from the strip's left edge. Colours have room for opacities that are not drawn, so that the data does not move when the
+/// volume is hidden.
 double leftOf(const ShownFunction& shown, double font) {
-  return (kBarLeft + (shown.part == ShownFunction::Part::kBoth ? kCurveWidth : 0)) * font;
+  return (kBarLeft + (shown.part == ShownFunction::Part::kOpacities ? 0 : kCurveWidth)) * font;
 }
 
 double opacityOf(const TransferFunction& function, const TransferFunction::Value& value) {

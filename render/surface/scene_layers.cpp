@@ -7,11 +7,13 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "render/mesh/curve_set.h"
 #include "render/project/pixel_layers.h"
 #include "render/surface/rasterizer.h"
 #include "render/surface/sampled_layers.h"
@@ -93,6 +95,20 @@ void appendShadowed(std::span<const PixelLayer> layers, const SceneLook& look, c
 }
 
 }  // namespace
+
+bool usesColours(const SurfaceScene& scene) {
+  const auto has = [](const std::vector<double>& values, const std::vector<std::optional<glm::vec3>>& own) {
+    return !values.empty() && (own.empty() || std::find(own.begin(), own.end(), std::nullopt) != own.end());
+  };
+  return scene.volume || !scene.slices.empty() || has(scene.isovalues, scene.iso_colours) ||
+         std::ranges::any_of(
+             scene.further_isosurfaces,
+             [&](const FurtherIsosurfaces& one) { return has(one.values, one.own_colours); }) ||
+         std::ranges::any_of(scene.grid_surfaces,
+                             [](const GridSurface& surface) { return surface.scalar && !surface.colours; }) ||
+         std::ranges::any_of(scene.curves,
+                             [](const Curves& one) { return !one.colours && !one.set->values.empty(); });
+}
 
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
                      std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,

@@ -22,6 +22,9 @@
 
 namespace curvisplat {
 
+/// Whether anything in a picture of this scene has the colours of the picture's function.
+bool usesColours(const SurfaceScene& scene);
+
 /// Translucent surfaces that are seen through one another at a sample, at most: more than a pixel has layers, whose last one
 /// takes what lies behind it.
 inline constexpr size_t kMaxPeels = 8;

@@ -61,6 +61,8 @@ TEST_F(Annotations, ScalarBarsComeWithColoursThatAreChosen) {
   ASSERT_EQ(again.back(), "--scalar-bar") << out;
   EXPECT_EQ(picture(again), with_bar) << out;
   EXPECT_EQ(picture({"--scalar-bar"}), with_bar);
+  const Words grey{"--surface", "kmin", "--volume", "off"};  // nothing has the colours
+  EXPECT_EQ(picture(grey + Words{"--scalar-bar"}), picture(grey + Words{"--no-scalar-bar"}));
   EXPECT_EQ(picture({}, "399x299"), picture({"--no-scalar-bar"}, "399x299"));
   EXPECT_EQ(picture({"--tf", "viridis"}), picture({"--tf", "viridis", "--no-scalar-bar"}));
 }

@@ -46,7 +46,7 @@ TEST_F(WindowKeyboard, TabReachesEveryTabOfThePanels) {
     std::vector<std::string> widgets;
   } tabs[] = {{"Colour",
                {"scalar", "colours", "range 1", "range 2", "log scale", "full range", "percentile range",
-                "automatic", "ramp", "band", "high", "clear", "opacity unit 1", "strength", "opacity points",
+                "automatic", "ramp", "band", "high", "clear", "opacity unit", "opacity points",
                 "colour points", "load", "save", "gradient opacity"}},
               {"Objects",
                {"eye of volume",
@@ -120,10 +120,10 @@ TEST_F(WindowKeyboard, SpaceAndReturnPressWhatHasTheRing) {
   press("Return");
   EXPECT_TRUE(eventually([&] { return difference(save(), first) >= 50; }));
   // A slider takes a number.
-  goTo("strength");
+  goTo("opacity unit");
   save();
   press("ctrl+a");
-  act({"type", "7"});
+  act({"type", "0.05"});
   press("Return");
   save();
   const Image dense = saveAndCopy();

@@ -452,8 +452,8 @@ TEST_F(WindowPanels, UndoAndRedo) {
 TEST_F(WindowPanels, SavesSeveralViews) {
   open();
   const Image first = save();
-  moveTo(placeOf("strength", -0.3));  // its label
-  widget("hint how opaque all is");
+  moveTo(placeOf("opacity unit", -0.3));  // its label
+  widget("hint the length over which the opacity accumulates");
   tab("View");
   click("view name");
   act({"type", "a/b view"});  // keys of the window are letters here
@@ -625,6 +625,35 @@ TEST_F(WindowPanels, CurveAndHistogramAnswerTheMouse) {
   EXPECT_EQ(gentle[2], 0);  // it rises from 50 to 80 %
   EXPECT_EQ(steep[2], 1);
   close();
+}
+
+/// A range of both signs gets zero in its middle. A name that its list's box cannot show is in the box's hint.
+TEST_F(WindowPanels, ValuesOfBothSignsAndALongName) {
+  const std::string name = "difference_of_the_pressure_from_its_mean_in_time";
+  std::ofstream grid("signed.vtk");
+  grid
+      << "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 6 6 6\nORIGIN 0 0 0\n"
+      << "SPACING 1 1 1\nPOINT_DATA 216\nSCALARS " << name << " float\nLOOKUP_TABLE default\n";
+  for (int n = 0; n < 216; ++n) grid << 0.02 * n - 1 << '\n';
+  grid.close();
+  run({"convert", "signed.vtk", "-o", "signed.splats"});
+  cache_ = "signed";
+  open();
+  moveTo(placeOf("opacity by"));
+  save();
+  EXPECT_FALSE(hasWidget("hint "));  // its text fits
+  moveTo(placeOf("scalar"));
+  widget("hint " + name);
+  click("full range");
+  moveTo(rest_);
+  saveAndCopy();
+  click("symmetric range");
+  moveTo(rest_);
+  saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_EQ(valueOf(commands[0], "--range"), "-1,3.3");
+  EXPECT_EQ(valueOf(commands[1], "--range"), "-3.3,3.3");
 }
 
 /// Braces in a title are no fields of --title. The button below the panels asks for name and size of a picture; the folder that was

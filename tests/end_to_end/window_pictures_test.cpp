@@ -304,6 +304,7 @@ TEST_F(WindowMovie, OnceAroundIsWhatRenderDraws) {
   press("h");  // without the panels
   ASSERT_TRUE(eventually([] { return !hasWidget("curve"); }));
   chooseOnceAround();
+  placeOf("texts 12 pixels high");
   answer("movie/m.png");
   placeOf("stop movie");
   press("x");  // the movie is of what was shown then

@@ -67,21 +67,36 @@ TEST_F(WindowStart, TheDialogOpensAZarrStore) {
   close();
 }
 
-/// The grid alone is not enough; the dialog is then where the grid is, and with its solution what was said goes away.
+/// The grid alone is not enough: the dialog says so, with the grid still chosen. With its solution what was said goes away. The folder is
+/// that of the next grid's dialog, also in the next window, and not of pictures.
 TEST_F(WindowStart, ALoneGridAsksForItsSolution) {
   fs::remove_all("both");
   fs::create_directory("both");
   for (const char* name : {"a.xyz", "a.fun", "a.nam"}) fs::copy_file(name, fs::path("both") / name);
   openEmpty();
   click("open");
-  answer("both/a.xyz");
+  placeOf("file name");
+  act({"type", "both/a.xyz"});
+  press("Return");
   const auto says = [] { return hasWidget("message a.xyz: has no values"); };
-  EXPECT_TRUE(eventually(says, 60));
-  click("open");
-  placeOf("file a.fun");
-  answer("a.xyz a.fun");
+  EXPECT_TRUE(eventually([] { return hasWidget("file error a.xyz: has no values"); }));
+  EXPECT_TRUE(says());
+  moveTo(placeOf("file a.fun"));
+  act({"keydown", "ctrl", "click", "1", "keyup", "ctrl"});
+  click("file accept");
   EXPECT_TRUE(eventually([] { return hasWidget("scalar shown: f"); }, 60));
   EXPECT_TRUE(eventually([&] { return !says(); }));
+  click("Save picture as...");
+  placeOf("file both");
+  press("Escape");
+  EXPECT_TRUE(eventually([] { return !hasWidget("file name"); }));
+  close();
+  openEmpty();
+  click("open");
+  placeOf("file a.fun");
+  EXPECT_FALSE(hasWidget("file both"));
+  press("Escape");
+  EXPECT_TRUE(eventually([] { return !hasWidget("file name"); }));
   close();
 }
 

@@ -190,6 +190,8 @@ TEST_F(WindowSurfaces, AnIsosurfaceHasAColourOfItsOwn) {
   click("scalar bar");  // which shows the function's colours
   tab("Objects");
   const Image by_function = saveAndCopy();
+  moveTo(placeOf("isosurface 1 by colours"));
+  EXPECT_TRUE(eventually([] { return hasWidget("hint the colours that f has in the scalar bar"); }));
   click("isosurface 1 by colours");  // it keeps the colour that it has
   EXPECT_GE(difference(saveAndCopy(), by_function), 45);
   click("colour of isosurface 1");
@@ -321,6 +323,7 @@ TEST_F(WindowSurfaces, EyesHideWhatIsListed) {
   EXPECT_LT(difference(all, none), 40);
   EXPECT_TRUE(hasWidget("remove surface 1"));
   click("eye of surface 1");
+  click("eye of volume");  // the scalar bar goes with it
   moveTo(rest_);
   const Image surface = saveAndCopy();
   const auto commands = close();
@@ -341,10 +344,11 @@ TEST_F(WindowSurfaces, OfFilesAreAddedByTheDialog) {
   openObjects();
   const Image plain = save();
   choose("Picture", "Add a surface from a file...");
-  answer("broken.stl");
-  EXPECT_TRUE(eventually([] { return hasWidget("message broken.stl") || hasWidget("message /"); }));
+  placeOf("file name");
+  act({"type", "broken.stl"});
+  press("Return");
+  EXPECT_TRUE(eventually([] { return hasWidget("file error "); }));
   EXPECT_FALSE(hasWidget("remove surface file 1"));
-  choose("Picture", "Add a surface from a file...");
   answer("sheet.obj");
   placeOf("remove surface file 1");
   const Image with_sheet = saveAndCopy();

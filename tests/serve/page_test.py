@@ -292,14 +292,20 @@ def typed_numbers(tab):
     changes(tab, lambda: set_value(tab, "#slices .at", repr(wanted)), "its place")
     expect(abs(tab.run(f"{PAGE}.state.slices[0].point[0]") - wanted) < 1e-9, "it is where the number says")
     expect(tab.run("document.querySelector('#slices .at').previousSibling.previousSibling.textContent") == "x of plane", "the number is of x")
+    x, y = tab.place(".grip")
+    right, down = tab.run("document.querySelector('.grip').along")
+    changes(tab, lambda: tab.drag((x, y), (x + 0.2 * right, y + 0.2 * down)), "its grip", "grip")
+    moved = tab.run(f"{PAGE}.state.slices[0].point[0]") - wanted
+    expect(abs(moved / (0.1 * (upper[0] - lower[0])) - 1) < 0.1, f"the grip follows the mouse: {moved}")
+    changes(tab, lambda: set_value(tab, "#slices .at", repr(wanted)), "its place")
     changes(tab, lambda: set_value(tab, "#slices .triple input:nth-of-type(2)", "1"), "its tilt", "tilted")
     normal = tab.run(f"{PAGE}.state.slices[0].normal")
     expect(max(abs(a - b) for a, b in zip(normal, (0.5 ** 0.5, 0.5 ** 0.5, 0))) < 1e-9, f"a normal of 1, 1, 0: {normal}")
     tab.run("document.getElementById('picture').focus()")
-    for _ in range(3):
+    for _ in range(5):
         tab.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'z', ctrlKey: true }))")
         rest(tab)
-    expect(rest(tab) == before, "Ctrl+Z undoes the tilt, the place and the direction")
+    expect(rest(tab) == before, "Ctrl+Z undoes the tilt, the places and the direction")
     tab.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Z', ctrlKey: true, shiftKey: true }))")
     expect(rest(tab) != before and tab.run(f"{PAGE}.state.slices[0].normal") == [1, 0, 0], "Ctrl+Shift+Z does the first again")
     press(tab, "#slices button:last-of-type")
@@ -423,7 +429,7 @@ def asinh_scale(tab, caches):
     tab.run("(() => { const [low, high] = range(), size = high - low; setRange(low, high, false, [low + 0.1 * size, 0.05 * size]); "
             "askColours(state.parts.map); })()")
     tab.wait("state.function.RGBPoints.length === 4 * 257", "the colours on that scale")
-    expect(not tab.run("document.getElementById('asinh').hidden"), "the scale is named")
+    expect(tab.run("document.getElementById('asinh').checked"), "the scale is named")
     changes(tab, lambda: tab.click("#band"), "a band in asinh", "asinh_band")
     expect(tab.run("points().map(p => p.u)") == [0, 0.4, 0.5, 0.6, 1], f"it has the band's points: {tab.run('points()')}")
     low, high = tab.run("range()")
@@ -438,6 +444,12 @@ def asinh_scale(tab, caches):
     set_value(tab, "#low", repr(low + 0.05 * (high - low)))
     rest(tab)
     expect(tab.run("asinhOf() !== null && points().length") == 5, "another range keeps the scale")
+    changes(tab, lambda: press(tab, "#asinh"), "a linear scale")
+    expect(tab.run("asinhOf() === null && points().map(p => Math.round(1e6 * p.u) / 1e6)") == [0, 0.4, 0.5, 0.6, 1], f"the scale alone changes: {tab.run('points()')}")
+    expect(not tab.run("document.getElementById('asinh').checkVisibility()"), "a scale that is not there cannot be switched on")
+    press(tab, "#undo")
+    rest(tab)
+    expect(tab.run("document.getElementById('asinh').checked"), "undo brings it back")
     press(tab, "#ramp")
     tab.wait("asinhOf() === null && state.function.RGBPoints.length < 4 * 257", "a ramp on the map's own scale")
     choose_automatic(tab)
@@ -1008,9 +1020,9 @@ def as_many_clients_as_may_be(browser, caches):
 
 def serves_a_grid(folder):
     os.environ["XDG_CACHE_HOME"] = f"{folder}/kept"
-    with serving(program, [f"{folder}/g.xyz", f"{folder}/g.fun"]) as server:
+    with serving(program, [f"{folder}/annulus.splats", f"{folder}/g.xyz", f"{folder}/g.fun"]) as server:
         names = Viewer(server).hello["caches"]
-        expect(names == ["g"], f"a grid is served as its cache: {names}")
+        expect(names == ["annulus", "g"], f"a grid is served as its cache, beside another one: {names}")
 
 
 def thumbnails(browser, caches):

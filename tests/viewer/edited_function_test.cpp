@@ -106,6 +106,18 @@ TEST(EditedFunction, ChangesMakeItNoPreset) {
   EXPECT_EQ(edited.preset(), "");
 }
 
+/// The points stay where they are along the range.
+TEST(EditedFunction, TheScaleAloneBecomesLinear) {
+  const FunctionParts parts{"inferno", {0, 4}, AsinhScale{1, 0.25}, {{0, 0.5}, {0.25, 0}, {1, 0.75}}, 0.5};
+  EditedFunction function(parts);
+  ASSERT_TRUE(function.asinhScale());
+  function.setLinear();
+  EXPECT_FALSE(function.asinhScale());
+  EXPECT_EQ(function.scalarAt(0.25), 1);
+  ASSERT_TRUE(function.parts());
+  EXPECT_EQ(textOf(function.parts()->opacities), textOf(parts.opacities));
+}
+
 /// The share below x is x squared where the histogram is even and opacities rise as x.
 TEST(EditedFunction, AnIsosurfaceBeginsInTheMiddleOfWhatIsSeen) {
   EditedFunction function("viridis", 10, 20, 1);

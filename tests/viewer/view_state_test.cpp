@@ -2,6 +2,9 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <numbers>
@@ -10,7 +13,10 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/os.h"
+#include "stream/base/text.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
 #include "tools/view/picture_layout.h"
 #include "tools/view/saved_views.h"
 #include "tools/view/view_state.h"
@@ -400,6 +406,40 @@ TEST(ViewState, LinesOfTheScalarThatIsDrawnHaveItsFunction) {
   }
 }
 
+TEST(ViewState, AScalarBarIsOfColoursThatSomethingHas) {
+  ViewState state = firstViewOf(manifest(), {300, 200});  // of density
+  const auto titles = [&] {
+    const ShownFunctions functions(state, manifest());
+    std::vector<std::string> all;
+    for (const ShownFunction& shown : functions.bars()) all.push_back(shown.title);
+    return all;
+  };
+  using Titles = std::vector<std::string>;
+  const std::string density = scalarTitle("density", "kg/m3");
+  state.faces = {{"kmin"}};
+  EXPECT_EQ(titles(), Titles{density});
+  state.volume = false;
+  EXPECT_EQ(titles(), Titles{});
+  state.faces_by = FacesScalar{"density", state.function};
+  EXPECT_EQ(titles(), Titles{density});
+  state.faces_by->variable = "u v";
+  ASSERT_EQ(titles().size(), 1u);
+  EXPECT_TRUE(titles()[0].starts_with("u v"));
+  state.faces_by.reset();
+  for (const char* scalar : {"density", "u v"}) {
+    state.isosurfaces = {{scalar, 0.5}};
+    EXPECT_EQ(titles(), Titles{density}) << scalar;
+    state.isosurfaces[0].colour = glm::vec3(1, 0, 0);
+    EXPECT_EQ(titles(), Titles{}) << scalar;
+  }
+  state.slices = {{{{0, 0, 0}, {0, 0, 1}}}};
+  EXPECT_EQ(titles(), Titles{density});
+  // The picture stays in its place when the volume comes or goes.
+  const int width = dataSizeOf(state, manifest(), {300, 200}).width;
+  state.volume = true;
+  EXPECT_EQ(dataSizeOf(state, manifest(), {300, 200}).width, width);
+}
+
 TEST(ViewState, OfAnEarlierVersionHasIsosurfacesOfItsOpacities) {
   auto json = nlohmann::json::parse(toJson(changedState()));
   json.erase("isosurfaces");
@@ -430,6 +470,24 @@ TEST(ViewState, OfAnEarlierVersionShowsTheIsosurfacesItDrew) {
   json["isovalues"] = {0.5};  // without the volume, and density's own hidden, it drew the other scalar's
   json["isosurfaces"][0]["visible"] = false;
   EXPECT_EQ(shown(json), (std::vector<bool>{false, true, false}));
+}
+
+/// The shell that the command is pasted into finds this program.
+TEST(RenderCommand, BeginsWithTheProgramThatIsRunning) {
+  const TemporaryFolder folder;
+  const std::string path = std::getenv("PATH"), own = shellWord(os::programFile().string());
+  const auto wordWith = [&](const std::string& first) {
+    setenv("PATH", ((folder / first).string() + ":" + path).c_str(), 1);
+    const std::string word = programWord();
+    setenv("PATH", path.c_str(), 1);
+    return word;
+  };
+  for (const char* name : {"none", "same", "other"}) std::filesystem::create_directory(folder / name);
+  std::filesystem::create_symlink(os::programFile(), folder / "same" / "curvisplat");
+  std::ofstream(folder / "other" / "curvisplat") << "another program";
+  EXPECT_EQ(wordWith("none"), own);
+  EXPECT_EQ(wordWith("same"), "curvisplat");
+  EXPECT_EQ(wordWith("other"), own);
 }
 
 TEST(RenderCommand, HasEveryOption) {

@@ -70,14 +70,17 @@ void warnOfNetwork(const ServerOptions& options) {
       options.address);
 }
 
-/// The caches; of a grid with its solutions the one that is kept for it.
+/// The caches; of the other files, a grid with its solutions, the one that is kept for them, last.
 std::vector<std::filesystem::path> cachesToServe(const std::vector<std::filesystem::path>& files) {
-  if (!isGrid({files.front()})) return files;
+  std::vector<std::filesystem::path> caches, grid;
+  for (const std::filesystem::path& file : files) (isGrid({file}) ? grid : caches).push_back(file);
+  if (grid.empty()) return caches;
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   KeptCacheEvents events;
   events.say = [](const std::string& text) { printMessage("{}", text); };
-  return {keptCacheOf(files, progress, events)};
+  caches.push_back(keptCacheOf(grid, progress, events));
+  return caches;
 }
 
 void serve(const ServeArguments& arguments) {
@@ -109,10 +112,9 @@ void addServe(CLI::App& app) {
   auto arguments = std::make_shared<ServeArguments>();
   CLI::App* command = app.add_subcommand("serve", "Show caches or a grid in a web browser");
   command
-      ->add_option(
-          "CACHE", arguments->caches,
-          "Splat caches, directories NAME.splats; or a grid and its solutions, which are converted into "
-          "the user's cache folder")
+      ->add_option("CACHE", arguments->caches,
+                   "Splat caches, directories NAME.splats; a grid and its solutions are converted into the "
+                   "user's cache folder")
       ->required();
   command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")
       ->check(CLI::Range(0u, 65535u))

@@ -18,6 +18,7 @@
 #include "render/mesh/triangle_mesh.h"
 #include "render/surface/curve_times.h"
 #include "render/surface/iso_groups.h"
+#include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/text.h"
@@ -604,8 +605,9 @@ std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, 
   };
   const bool volume = !scene || scene->volume;
   using Part = ShownFunction::Part;
-  shown.push_back({&coloured.function, titleOf(coloured.variable),
-                   scalars.colour || !volume ? Part::kColours : Part::kBoth});
+  if (!scene || usesColours(*scene))
+    shown.push_back({&coloured.function, titleOf(coloured.variable),
+                     scalars.colour || !volume ? Part::kColours : Part::kBoth});
   if (scalars.colour && volume)
     shown.push_back(
         {&scalars.opacity.function, titleOf(scalars.opacity.variable) + " (opacity)", Part::kOpacities});

@@ -137,7 +137,7 @@ std::array<std::string, 3> axisTitles(const AnnotationArguments& arguments);
 ShownBox shownBox(const Manifest& manifest, const glm::dvec3& scale, const std::optional<WorldBox>& clip_box,
                   const Annotations& annotations);
 
-/// The functions that a picture shows, each once: of its colours, of its opacities if these are another
+/// The functions that a picture shows, each once: of its colours where anything has them, of its opacities if these are another
 /// scalar's, and of surfaces that are coloured by a scalar of their own, `surface_by`. They are borrowed
 /// from `scalars` and `scene`, which may be null. Throws UsageError for more titles than that.
 std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, const DrawnScalars& scalars,

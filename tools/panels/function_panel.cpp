@@ -393,13 +393,14 @@ void FunctionPanel::drawRange(EditedFunction& function, size_t variable, uint64_
                      of.min, of.max)
              .c_str());
   }
-  // The tick says which of the others it is.
-  if (function.asinhScale()) {
+  bool asinh_scale = function.asinhScale();
+  if (asinh_scale) {
     ImGui::SameLine();
-    ImGui::TextUnformatted("scale: asinh");
-    hint(
-        "Chosen from the data: linear around their middle, logarithmic further out.\n"
-        "Ramp makes it linear, log scale logarithmic.");
+    if (option("asinh scale", asinh_scale)) {
+      function.setLinear();
+      result.changed = true;
+    }
+    hint("chosen from the data: linear around their middle, logarithmic further out");
   }
   nameWidget(fmt::format("scale {}", function.asinhScale() ? "asinh"
                                      : function.logScale() ? "logarithmic"
@@ -446,28 +447,21 @@ void FunctionPanel::drawOpacities(EditedFunction& function, Result& result) {
 }
 
 void FunctionPanel::drawUnit(EditedFunction& function, Result& result) {
-  const double unit = function.opacityUnit();
-  label("opacity unit");
-  if (const auto typed = typed_.draw("##opacity unit", {&unit, 1}, "%.4g")) {
-    function.setOpacityUnit(typed->front());
-    result.changed = true;
-  }
-  nameWidget("opacity unit");
-  hint("the length over which the opacity accumulates: smaller is more opaque");
   const Manifest& manifest = cache_.manifest();
-  const double usual = std::max(0.01 * glm::distance(manifest.lower, manifest.upper), 1e-300);
-  constexpr double kThinnest = 0.01, kDensest = 10'000;
-  double density = usual / unit;
-  label("strength");
-  if (slider("##strength", density, kThinnest, kDensest, "%.3g",
-             ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp)) {
-    constexpr int kDigits = 3;
-    function.setOpacityUnit(roundedTo(usual / density, usual / density, kDigits));
+  const double size = std::max(glm::distance(manifest.lower, manifest.upper), 1e-300);
+  constexpr double kThinnest = 1, kDensest = 1e-6;  // of the size
+  double unit = function.opacityUnit();
+  label("opacity unit");
+  if (slider("##opacity unit", unit, kThinnest * size, kDensest * size, "%.4g",
+             ImGuiSliderFlags_Logarithmic)) {
+    function.setOpacityUnit(unit);
     result.changed = true;
   }
   result.dragging |= isDragged();
-  nameWidget("strength");
-  hint("how opaque all is: a hundredth of the data's size, over the opacity unit");
+  nameWidget("opacity unit");
+  hint(
+      "the length over which the opacity accumulates; to the right it is smaller, and all is more opaque\n"
+      "double click to type a number");
 }
 
 }  // namespace curvisplat

@@ -400,14 +400,14 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   ImGui::SameLine();
   commandOption(Command::kFly, actions, "fly", facts.flies);
   constexpr std::pair<Command, const char*> kSides[]{
-      {Command::kLookPlusX, "+x"},     {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
-      {Command::kLookMinusY, "-y"},    {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
-      {Command::kLookIsometric, "Iso"}};
+      {Command::kLookPlusX, "+x"},      {Command::kLookMinusX, "-x"}, {Command::kLookPlusY, "+y"},
+      {Command::kLookMinusY, "-y"},     {Command::kLookPlusZ, "+z"},  {Command::kLookMinusZ, "-z"},
+      {Command::kLookIsometric, "+xyz"}};
   label("look from");
   hint("+x: from the end of the x axis, towards -x; the other keys are alike");
   for (const auto& [command, text] : kSides) {
     commandButton(command, actions, text);
-    if (command != Command::kLookIsometric) ImGui::SameLine();
+    if (command != Command::kLookIsometric) ImGui::SameLine(0, ImGui::GetStyle().ItemInnerSpacing.x);
   }
   float angle = static_cast<float>(state.camera.view_angle_deg);
   label("view angle");
@@ -487,11 +487,12 @@ void Panels::drawDetail(ViewState& state, PanelActions& actions) {
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
   actions.changed |= ImGui::IsItemDeactivatedAfterEdit();
   nameWidget("memory, MiB");
-  bool per_pixel = state.classification == Classification::kPixel;
-  if (option("classify every pixel", per_pixel)) {
-    state.classification = per_pixel ? Classification::kPixel : Classification::kFlat;
+  bool is_flat = state.classification == Classification::kFlat;
+  if (option("one colour per splat", is_flat)) {
+    state.classification = is_flat ? Classification::kFlat : Classification::kPixel;
     actions.changed = true;
   }
+  hint("off: each pixel has the colour of the value there, also within a splat");
 }
 
 namespace {

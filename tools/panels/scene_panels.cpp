@@ -450,11 +450,12 @@ void SurfacePanel::drawColourOf(Isosurface& one, const std::string& name, const 
   actions.dragging |= isDragged();
   ImGui::SameLine();
   bool is_of_function = !one.colour;
-  if (ImGui::Checkbox("from the colour map", &is_of_function)) {
+  if (ImGui::Checkbox(("by " + state.variable).c_str(), &is_of_function)) {
     one.colour = is_of_function ? std::nullopt : std::optional(colour);
     actions.changed = true;
   }
   nameWidget(name + " by colours");
+  hint(fmt::format("the colours that {} has in the scalar bar", state.variable).c_str());
 }
 
 }  // namespace curvisplat

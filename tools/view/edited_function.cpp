@@ -125,6 +125,12 @@ bool EditedFunction::setLogScale(bool log_scale) {
   return true;
 }
 
+void EditedFunction::setLinear() {
+  definition_.log_scale = false;
+  asinh_.reset();
+  edited();
+}
+
 void EditedFunction::setOpacityUnit(double unit) {
   if (unit > 0 && std::isfinite(unit)) opacity_unit_ = unit;
 }

@@ -69,6 +69,7 @@ class EditedFunction {
   double coordinateOf(double scalar) const { return axis().fractionOf(scalar); }
   /// Returns false and changes nothing if the range is not above zero.
   bool setLogScale(bool log_scale);
+  void setLinear();
   double opacityUnit() const { return opacity_unit_; }
   void setOpacityUnit(double unit);
 

@@ -9,6 +9,7 @@
 
 #include "render/annotate/globe_box.h"
 #include "render/frame/frame_plan.h"
+#include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -25,7 +26,11 @@ ShownFunctions::ShownFunctions(const ViewState& state, const Manifest& manifest)
     : colours_(state.function.function()),
       title_(titleOf(manifest, state.variable)),
       shows_opacities_(!state.opacity_by && state.drawsVolume()) {
-  if (!state.faceNames().faces.empty() && state.faces_by && state.faces_by->variable != state.variable) {
+  const bool has_faces = state.faces_by && !state.faceNames().faces.empty();
+  const bool faces_differ = has_faces && state.faces_by->variable != state.variable;
+  const auto scene = state.frameOptions({1, 1}, manifest).scene;
+  shows_colours_ = !scene || usesColours(*scene) || (has_faces && !faces_differ);
+  if (faces_differ) {
     of_faces_ = state.faces_by->function.function();
     faces_title_ = titleOf(manifest, state.faces_by->variable);
   }
@@ -48,7 +53,8 @@ DrawnScalars ShownFunctions::scalars(const CacheReader& cache, const ViewState& 
 
 std::vector<ShownFunction> ShownFunctions::bars() const {
   using Part = ShownFunction::Part;
-  std::vector<ShownFunction> bars{{&colours_, title_, shows_opacities_ ? Part::kBoth : Part::kColours}};
+  std::vector<ShownFunction> bars;
+  if (shows_colours_) bars.push_back({&colours_, title_, shows_opacities_ ? Part::kBoth : Part::kColours});
   if (opacities_ && !opacity_title_.empty()) bars.push_back({&*opacities_, opacity_title_, Part::kOpacities});
   if (of_faces_) bars.push_back({&*of_faces_, faces_title_});
   if (of_curves_) bars.push_back({of_curves_.get(), curves_title_});

@@ -36,7 +36,7 @@ class ShownFunctions {
   std::optional<TransferFunction> opacities_, of_faces_;  // of faces that have a scalar of their own
   std::shared_ptr<const TransferFunction> of_curves_;     // of values other than the picture's
   std::string title_, opacity_title_, faces_title_, curves_title_;
-  bool shows_opacities_;  // those of colours_
+  bool shows_colours_, shows_opacities_;  // of colours_
 };
 
 /// The part of a picture that shows the data.

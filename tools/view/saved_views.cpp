@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -17,6 +18,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/json_document.h"
+#include "stream/base/os.h"
 #include "stream/base/text.h"
 #include "stream/cache/faces_file.h"
 
@@ -329,6 +331,19 @@ bool needsFile(const EditedFunction& function) {
   return !function.parts();
 }
 
+std::string programWord() {
+  const fs::path program = os::programFile();
+  const char* const path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "");
+  std::error_code ignored;
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const fs::path found = fs::path(folder) / "curvisplat";
+    if (fs::equivalent(found, program, ignored)) return "curvisplat";
+    if (fs::exists(found, ignored)) break;  // another one
+  }
+  return program.empty() ? "curvisplat" : shellWord(program.string());
+}
+
 std::filesystem::path shortPath(const std::filesystem::path& path) {
   std::error_code ignored;
   const std::filesystem::path whole = std::filesystem::weakly_canonical(path, ignored);
@@ -342,7 +357,8 @@ std::string renderCommand(const ViewState& state, const CommandOptions& options)
   for (const std::filesystem::path& file : options.solutions)
     files += fmt::format(" {}", shellWord(file.string()));
   const bool of_film = !options.film.empty(), is_movie = options.turn_frames > 0 || of_film;
-  CommandLine words(fmt::format("curvisplat render {} -o {}", files, is_movie ? "movie.mp4" : "picture.png"));
+  CommandLine words(
+      fmt::format("{} render {} -o {}", options.program, files, is_movie ? "movie.mp4" : "picture.png"));
   if (options.precision != ValuePrecision::kAuto) words.add("--value-precision", wordOf(options.precision));
   const int multiple = is_movie ? 2 : 1;  // an .mp4 has an even width and height
   words.add("--size", fmt::format("{}x{}", options.size.width / multiple * multiple,

@@ -60,6 +60,7 @@ struct CommandOptions {
   uint64_t film_frames = 0;
   std::vector<std::filesystem::path> solutions = {};  // where `cache` is a grid: its further files
   ValuePrecision precision = ValuePrecision::kAuto;   // of such a grid: --value-precision
+  std::string program = "curvisplat";                 // as programWord()
 };
 
 /// Whether options cannot state the function, so that it has to be in a file (toParaViewPreset()).
@@ -67,6 +68,9 @@ bool needsFile(const EditedFunction& function);
 
 /// The shell command. Options that have their defaults are left out.
 std::string renderCommand(const ViewState& state, const CommandOptions& options);
+
+/// The word that starts this program in a shell: its path, quoted if need be; its name where PATH leads to it.
+std::string programWord();
 
 /// `path` as seen from the current folder if it lies in there, else as it is.
 std::filesystem::path shortPath(const std::filesystem::path& path);

@@ -282,6 +282,7 @@ class CacheView {
   GlobeGrid globe_grid_;
   FunctionChooser chooser_;
   std::future<SurfaceFile> reading_surface_;  // that is to be added
+  std::filesystem::path reading_file_;
   struct FoundIsosurface {
     Isosurface surface;
     std::optional<uint64_t> replaced;  // the id of the one that takes scalar and value; none: it is added

@@ -144,7 +144,8 @@ CacheView::MovieChoice CacheView::movieChoice(MovieKind kind) const {
 void CacheView::saveMovieOf(MovieKind kind) {
   movie_kind_ = kind;
   const MovieRequest movie = newMovie(kind, movieChoice(kind));
-  FileDialog::MovieOffer offer{picture_size_, movie.size, movie.frames_per_s, {}, encodes_movies_};
+  FileDialog::MovieOffer offer{picture_size_,      movie.size, textSize(),
+                               movie.frames_per_s, {},         encodes_movies_};
   if (kind == MovieKind::kOneTurn) offer.chosen_frames = framesOf(movie);
   // The dialog may outlive this view.
   offer.frames = [film = film_, frames = framesOf(movie), kind](double rate) {

@@ -259,6 +259,7 @@ void CacheView::copyCommand(MovieKind what) {
     const bool of_film = what == MovieKind::kFilm;
     if (of_film && !film_.film()) return;  // its key frames were removed meanwhile
     CommandOptions options{shortPath(preview_ ? preview_->whole : cache_.wholePath()), picture_size_, {}, {}};
+    options.program = programWord();
     ViewState state = state_;
     if (what != MovieKind::kOnePicture) {
       const MovieRequest movie = copiedMovie(what);
@@ -333,6 +334,7 @@ void CacheView::use(const FileDialog::Chosen& chosen) {
     }
   } catch (const Error& error) {
     reports_.report(error);
+    dialog_.openAgain(chosen.files, error.what());
   }
 }
 
@@ -455,6 +457,7 @@ void CacheView::readSurface(const fs::path& file) {
   if (reading_surface_.valid()) return say("A surface is being read already.");
   if (state_.surfaces.size() + state_.faces.size() >= kMaxSurfaces)
     return say(fmt::format("There are {} surfaces, and no more can be added.", kMaxSurfaces));
+  reading_file_ = file;
   reading_surface_ = std::async(std::launch::async, [file] {
     nameThisThread("surface");
     struct WakeAtEnd {
@@ -470,8 +473,13 @@ void CacheView::takeSurface() {
   if (!reading_surface_.valid() ||
       reading_surface_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
     return;
-  state_.surfaces.push_back(reading_surface_.get());
-  changed_ = true;
+  try {
+    state_.surfaces.push_back(reading_surface_.get());
+    changed_ = true;
+  } catch (const Error& error) {
+    reports_.report(error);
+    dialog_.openAgain({reading_file_}, error.what());
+  }
 }
 
 /// Takes the function that the chooser has found.

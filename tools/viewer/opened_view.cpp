@@ -221,6 +221,9 @@ void OpenedView::takeWhole() {
   } catch (const Interrupted&) {
   } catch (const Error& error) {
     surroundings_.reports.report(error, About::kOpening);
+    // Who looks at a preview by now is not disturbed.
+    if (!adds_to_ && !(view_ && view_->preview()))
+      surroundings_.dialog.openAgain(opening_files_, inWindowsWords(error.what()));
   } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
     surroundings_.reports.report(error, About::kOpening);
   }

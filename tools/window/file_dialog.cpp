@@ -126,10 +126,21 @@ void FileDialog::openToSavePicture(const std::string& name, ImageSize size, doub
 }
 
 void FileDialog::openToSaveMovie(const std::string& name, MovieOffer offer) {
+  text_pixels_ = offer.text_pixels;
   open(Purpose::kSaveMovie, name);
   size_ = offer.size;
   offered_size_ = offer.shown;
   movie_ = std::move(offer);
+}
+
+void FileDialog::openAgain(const std::vector<fs::path>& files, const std::string& why) {
+  if (isOpen() || !given_ || given_->files != files) return;
+  open(given_->purpose);  // in the folder of the first
+  std::vector<std::string> names;
+  for (const fs::path& file : files)
+    names.push_back((file.parent_path() == folder_ ? file.filename() : file).string());
+  select(std::move(names));
+  error_ = why;
 }
 
 void FileDialog::enter(const fs::path& folder) {
@@ -154,7 +165,10 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   const float unit = ImGui::GetFontSize();
   ImGui::SetNextWindowSize({std::min(46 * unit, whole.x), std::min(32 * unit, whole.y)}, ImGuiCond_Appearing);
   ImGui::SetNextWindowPos({0.5f * whole.x, 0.5f * whole.y}, ImGuiCond_Appearing, {0.5f, 0.5f});
-  if (!ImGui::BeginPopupModal(look.title)) {
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 1);  // it is as dark as what lies behind it
+  const bool is_open = ImGui::BeginPopupModal(look.title);
+  ImGui::PopStyleVar();
+  if (!is_open) {
     purpose_.reset();
     return std::nullopt;
   }
@@ -171,6 +185,10 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
   }
   ImGui::TextUnformatted(folder_.c_str());
   help_ ? drawHelp(look.saves) : drawEntries(accepts);
+  if (!error_.empty()) {
+    ImGui::TextWrapped("%s", error_.c_str());
+    nameWithoutTab("file error " + error_);
+  }
   ImGui::SetNextItemWidth(-1);
   if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
   // Where no widget has the keyboard, Return is the button's.
@@ -197,17 +215,15 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     if (toggles) enter(fs::path(folder_));
     ImGui::SameLine();
   }
-  if (error_.empty() && *purpose_ == Purpose::kOpenData)
+  if (*purpose_ == Purpose::kOpenData)
     ImGui::TextDisabled("Ctrl or Shift + click takes several: a grid and its solutions");
-  else if (error_.empty() && *purpose_ == Purpose::kSaveMovie)
+  else if (*purpose_ == Purpose::kSaveMovie)
     ImGui::TextDisabled("%s",
                         movie_.has_encoder
                             ? ".mp4 or .gif; .html: a page that plays it; .png: numbered pictures"
                             : ".html: a page that plays it; .png: numbered pictures; .mp4, .gif need ffmpeg");
-  else if (error_.empty() && *purpose_ == Purpose::kSavePicture)
+  else if (*purpose_ == Purpose::kSavePicture)
     ImGui::TextDisabled("%s", textsOf(size_).c_str());
-  else
-    ImGui::TextUnformatted(error_.c_str());
   std::optional<Chosen> chosen;
   if (accepts) chosen = accept();
   if (chosen) {
@@ -215,6 +231,7 @@ std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
     const fs::path from = chosen->files.front().parent_path();
     if (fs::is_directory(from, ignored))  // also of a typed path
       (chosen->purpose == Purpose::kOpenData ? data_folder_ : work_folder_) = from;
+    given_ = chosen;
   }
   if (cancels || chosen) {
     ImGui::CloseCurrentPopup();
@@ -233,7 +250,11 @@ float FileDialog::heightBelow() const {
   const float lines = *purpose_ == Purpose::kSavePicture ? 3.6f
                       : *purpose_ == Purpose::kSaveMovie ? 4.6f
                                                          : 2.6f;
-  return lines * ImGui::GetFrameHeightWithSpacing();
+  const float wide = ImGui::GetContentRegionAvail().x;
+  const float of_error = error_.empty() ? 0
+                                        : ImGui::CalcTextSize(error_.c_str(), nullptr, false, wide).y +
+                                              ImGui::GetStyle().ItemSpacing.y;
+  return lines * ImGui::GetFrameHeightWithSpacing() + of_error;
 }
 
 /// Draws the list of the dialog's keys where the files are otherwise.
@@ -272,7 +293,7 @@ void FileDialog::drawSize() {
   number("picture height", size_.height);
   ImGui::TextUnformatted("pixels");
   nameWidget(fmt::format("picture of {} x {}", size_.width, size_.height));
-  if (*purpose_ == Purpose::kSavePicture) nameWidget(textsOf(size_));
+  nameWidget(textsOf(size_));
   const auto offer = [this](const char* text, ImageSize size) {
     ImGui::SameLine();
     if (ImGui::Button(text)) size_ = size;
@@ -314,6 +335,8 @@ void FileDialog::drawRate() {
   ImGui::TextUnformatted(movie_.chosen_frames > 0 ? fmt::format("pictures in all: {:.1f} s", seconds).c_str()
                                                   : fmt::format("{}: {:.1f} s", pictures, seconds).c_str());
   nameWidget(fmt::format("movie of pictures a second: {}, {:.1f} s", pictures, seconds));
+  ImGui::SameLine();
+  ImGui::TextDisabled("%s", textsOf(size_).c_str());
 }
 
 /// A click takes a name, with Control several; a double click opens.

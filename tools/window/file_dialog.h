@@ -54,6 +54,7 @@ class FileDialog {
   /// Size and rate of a movie, which can be changed.
   struct MovieOffer {
     ImageSize shown{0, 0}, size{0, 0};  // as the window shows it, and to begin with
+    double text_pixels = 0;             // the height of the texts of the first
     double frames_per_s = 25;
     std::function<uint64_t(double frames_per_s)> frames = {};  // how many pictures it has at that rate
     bool has_encoder = true;                                   // ffmpeg, which .mp4 and .gif need
@@ -76,6 +77,8 @@ class FileDialog {
   void openToSavePicture(const std::string& name, ImageSize size, double text_pixels);
   /// The same, to save a movie.
   void openToSaveMovie(const std::string& name, MovieOffer offer);
+  /// Opens it again with files that it gave last and that cannot be used, and says why. No effect for others.
+  void openAgain(const std::vector<std::filesystem::path>& files, const std::string& why);
   bool isOpen() const { return purpose_.has_value(); }
   /// Shows the list of the dialog's keys instead of the files, or the files again.
   void toggleHelp() { help_ = !help_; }
@@ -105,12 +108,13 @@ class FileDialog {
   std::filesystem::path data_folder_;  // from which data were opened last
   std::filesystem::path work_folder_;  // of pictures, films and states that were saved or opened last
   std::filesystem::path folder_;
+  std::optional<Chosen> given_;  // last
   std::vector<FolderEntry> entries_;
   std::vector<std::string> taken_;  // names that were clicked
   std::string taken_text_;          // them, as they were put into `name_`
   std::string name_, error_, overwrites_;
   ImageSize size_{0, 0}, offered_size_{0, 0};  // of a picture or a movie
-  double text_pixels_ = 0;                     // of a picture of the offered size
+  double text_pixels_ = 0;                     // of one of the offered size
   MovieOffer movie_;
 };
 
