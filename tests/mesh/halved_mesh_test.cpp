@@ -130,6 +130,15 @@ TEST(HalvedMesh, NodesThatHangAreTheMiddlesOfLargerCells) {
   EXPECT_EQ(places.size(), parts.points.x.size());
 }
 
+TEST(HalvedMesh, CornersOfThinLayersFarFromTheOriginAreNoMiddles) {
+  ArrayPiece cube =
+      evenCube(2);  // metres of a map, in layers that are thinner than single precision's steps there
+  for (glm::dvec3& point : cube.points) point = glm::dvec3(4e5, 5.5e6, 0) + glm::dvec3(100, 100, 0.1) * point;
+  const Whole parts(*halvedOf({cube}));
+  EXPECT_EQ(parts.points.x.size(), 5u * 5 * 5);
+  EXPECT_NEAR(parts.volume(), 200 * 200 * 0.2, 1);
+}
+
 TEST(HalvedMesh, ThinWallsStayWalls) {
   // Two cubes with points of their own where they meet.
   ArrayPiece piece = evenCube(1), other = evenCube(1);

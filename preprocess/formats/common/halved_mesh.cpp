@@ -25,7 +25,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kCellsAtOnce = 4096;
+constexpr uint64_t kCellsAtOnce = 4096, kMaxPoints = 10 * kMaxHalved;  // of a piece
 constexpr size_t kMiddlesAtOnce = size_t{1} << 20, kMiddlesReadAtOnce = 65536;
 
 /// The corners that a new point is the middle of, rising; the rest kNone.
@@ -66,30 +66,34 @@ class PointsByPlace {
  public:
   PointsByPlace(const MeshSource& source, uint32_t piece) {
     const uint64_t count = source.description().pieces[piece].points;
-    std::vector<glm::dvec3> places;
     MeshPoints points;
     double largest = 0;
     for (uint64_t first = 0; first < count; first += kPointsAtOnce) {
       source.readPoints(piece, first, std::min(kPointsAtOnce, count - first), {}, points);
       for (size_t n = 0; n < points.x.size(); ++n) {
-        places.emplace_back(points.x[n], points.y[n], points.z[n]);
-        const glm::dvec3 size = glm::abs(places.back());
+        places_.emplace_back(points.x[n], points.y[n], points.z[n]);
+        const glm::dvec3 size = glm::abs(places_.back());
         largest = std::max({largest, size.x, size.y, size.z});
       }
     }
     reach_ = largest * std::numeric_limits<float>::epsilon();
-    for (size_t n = 0; n < places.size(); ++n) {
-      const auto [at, is_new] = known_.try_emplace(boxOf(places[n]), static_cast<uint32_t>(n));
+    for (size_t n = 0; n < places_.size(); ++n) {
+      const auto [at, is_new] = known_.try_emplace(boxOf(places_[n]), static_cast<uint32_t>(n));
       if (!is_new) at->second = kNone;
     }
   }
 
-  /// kNone: none is there, or several, as on the two sides of a thin wall.
-  uint32_t at(const glm::dvec3& place) const {
-    for (int corner = 0; corner < 8; ++corner) {
-      const glm::dvec3 to((corner & 1) != 0 ? reach_ : -reach_, (corner & 2) != 0 ? reach_ : -reach_,
-                          (corner & 4) != 0 ? reach_ : -reach_);
-      if (const auto found = known_.find(boxOf(place + to)); found != known_.end()) return found->second;
+  /// The point at `place`, the middle between `corner` and others, to a hundredth of the way. kNone: none is there, or several are,
+  /// as on the two sides of a thin wall.
+  uint32_t at(const glm::dvec3& place, uint32_t corner) const {
+    const double most = std::min(2 * reach_, 0.01 * glm::distance(place, places_[corner]));
+    for (int side = 0; side < 8; ++side) {
+      const glm::dvec3 to((side & 1) != 0 ? reach_ : -reach_, (side & 2) != 0 ? reach_ : -reach_,
+                          (side & 4) != 0 ? reach_ : -reach_);
+      const auto found = known_.find(boxOf(place + to));
+      if (found == known_.end()) continue;
+      const uint32_t point = found->second;
+      return point != kNone && glm::distance(place, places_[point]) <= most ? point : kNone;
     }
     return kNone;
   }
@@ -103,6 +107,7 @@ class PointsByPlace {
     return {std::llround(place.x / edge), std::llround(place.y / edge), std::llround(place.z / edge)};
   }
 
+  std::vector<glm::dvec3> places_;
   double reach_ = 0;
   std::map<Box, uint32_t> known_;
 };
@@ -168,9 +173,8 @@ double volumeOf(CellKind shape, std::span<const glm::dvec3> corners) {
 
 /// A piece's new points and parts.
 struct HalvedPiece {
-  std::vector<Middle> middles;  // sorted
-  std::vector<uint32_t>
-      points;  // [middle]: its number in the piece: a new one, or of the point where a node hangs
+  std::vector<Middle> middles;      // sorted
+  std::vector<uint32_t> points;     // [middle]: a new point, or one of the file's where a node hangs
   std::vector<size_t> added;        // [new point]: its middle
   std::vector<uint64_t> begins{0};  // [cell + 1], in the parts
 };
@@ -228,7 +232,9 @@ class HalvedMesh final : public ForwardingMesh {
 
 HalvedPiece HalvedMesh::measured(uint32_t piece) const {
   const MeshPiece& whole = source().description().pieces[piece];
-  if (whole.points >= kNone) throw Error("{}: has too many points to be refined", whole.file);
+  if (whole.points > kMaxPoints)
+    throw Error("{}: has {} points; unstructured grids of up to {} points can be refined", whole.file,
+                whole.points, kMaxPoints);
   HalvedPiece found;
   std::vector<Middle>& middles = found.middles;
   size_t united = 0;
@@ -266,7 +272,8 @@ void HalvedMesh::findPoints(uint32_t piece, HalvedPiece& of) const {
     points = {};
     readMiddles(piece, std::span(of.middles).subspan(first, count), {}, points);
     for (size_t n = 0; n < count; ++n) {
-      const uint32_t there = known.at({points.x[n], points.y[n], points.z[n]});
+      const glm::dvec3 place(points.x[n], points.y[n], points.z[n]);
+      const uint32_t there = known.at(place, of.middles[first + n][0]);
       if (there == kNone) of.added.push_back(first + n);
       of.points.push_back(there == kNone ? next++ : there);
     }
@@ -437,6 +444,44 @@ void HalvedMesh::appendValues(const MeshCells& whole, size_t n, float value, con
     out.push_back(static_cast<float>(value + slope * (of_parts[part] - mean)));
 }
 
+/// How far volumes differ from cell to cell.
+struct Unevenness {
+  double squares = 0;  // of the logarithms of the largest over the smallest around a cell, times its volume
+  double volume = 0;
+};
+
+void addPiece(const MeshSource& source, uint32_t piece, Unevenness& to) {
+  const MeshPiece& whole = source.description().pieces[piece];
+  MeshCells cells;
+  source.readCells(piece, 0, whole.cells, {}, cells);
+  checkCells(cells, whole, 0);
+  for (size_t n = 0; n < cells.size(); ++n)
+    if (isHalved(cells, n)) cells.curved.emplace_back(n, kHalved);  // so that their corners are read
+  const CellNodes nodes(source, piece, cells, {}, {});
+  std::map<uint64_t, std::pair<double, size_t>> at_points;
+  std::vector<double> volumes(cells.size(), 0.0);
+  for (const auto& [n, curve] : cells.curved) {
+    const std::span<const uint64_t> corners = cells.cornersOfCell(n);
+    volumes[n] = volumeOf(cells.shapes[n], nodes.of(cells.shapes[n], curve, corners).places);
+    for (const uint64_t corner : corners) {
+      at_points[corner].first += volumes[n];
+      ++at_points[corner].second;
+    }
+  }
+  for (const auto& [n, curve] : cells.curved) {
+    if (!(volumes[n] > 0)) continue;
+    double least = std::numeric_limits<double>::infinity(), most = 0;
+    for (const uint64_t corner : cells.cornersOfCell(n)) {
+      const auto& [around, count] = at_points[corner];
+      least = std::min(least, around / static_cast<double>(count));
+      most = std::max(most, around / static_cast<double>(count));
+    }
+    const double growth = std::log(most / least);
+    to.squares += volumes[n] * growth * growth;
+    to.volume += volumes[n];
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<MeshSource> halved(std::unique_ptr<MeshSource> source, std::optional<double> blank_value) {
@@ -446,40 +491,13 @@ std::unique_ptr<MeshSource> halved(std::unique_ptr<MeshSource> source, std::opti
 bool isHalvedByNeed(const MeshSource& source) {
   constexpr uint64_t kMaxCells = 30'000;
   constexpr double kUneven = 0.07;
-  if (cellsOf(source.description()) > kMaxCells) return false;
-  double sum = 0, volume = 0;
-  MeshCells cells;
-  for (uint32_t piece = 0; piece < source.description().pieces.size(); ++piece) {
-    const MeshPiece& whole = source.description().pieces[piece];
-    source.readCells(piece, 0, whole.cells, {}, cells);
-    checkCells(cells, whole, 0);
-    for (size_t n = 0; n < cells.size(); ++n)
-      if (isHalved(cells, n)) cells.curved.emplace_back(n, kHalved);  // so that their corners are read
-    const CellNodes nodes(source, piece, cells, {}, {});
-    std::map<uint64_t, std::pair<double, size_t>> at_points;
-    std::vector<double> volumes(cells.size(), 0.0);
-    for (const auto& [n, curve] : cells.curved) {
-      const std::span<const uint64_t> corners = cells.cornersOfCell(n);
-      volumes[n] = volumeOf(cells.shapes[n], nodes.of(cells.shapes[n], curve, corners).places);
-      for (const uint64_t corner : corners) {
-        at_points[corner].first += volumes[n];
-        ++at_points[corner].second;
-      }
-    }
-    for (const auto& [n, curve] : cells.curved) {
-      double least = std::numeric_limits<double>::infinity(), most = 0;
-      for (const uint64_t corner : cells.cornersOfCell(n)) {
-        const auto& [around, count] = at_points[corner];
-        least = std::min(least, around / static_cast<double>(count));
-        most = std::max(most, around / static_cast<double>(count));
-      }
-      if (!(volumes[n] > 0)) continue;
-      const double growth = std::log(most / least);
-      sum += volumes[n] * growth * growth;
-      volume += volumes[n];
-    }
-  }
-  return sum > kUneven * kUneven * volume;
+  const std::vector<MeshPiece>& pieces = source.description().pieces;
+  if (cellsOf(source.description()) > kMaxCells ||
+      std::ranges::any_of(pieces, [](const MeshPiece& piece) { return piece.points > kMaxPoints; }))
+    return false;
+  Unevenness of_all;
+  for (uint32_t piece = 0; piece < pieces.size(); ++piece) addPiece(source, piece, of_all);
+  return of_all.squares > kUneven * kUneven * of_all.volume;
 }
 
 }  // namespace curvisplat
