@@ -240,6 +240,8 @@ TEST_F(RenderOptions, AnEmptyPictureIsExplained) {
                       kDefaultBackground),
       0u);
   expectSays(last_.err, "does not see the data's box");
+  render({"--zoom", "1e30"});
+  expectSays(last_.err, "splats are off the screen; try --view iso, or a smaller --zoom");
   render({"--opacity-unit", "1e12"}, "a.png");
   expectSays(last_.err, "--opacity-unit");
 }
