@@ -35,7 +35,7 @@ std::string whyTransparent(const RenderedScene& scene) {
   const TransferFunction& function = scene.transfer_function;
   const auto [low, high] = function.range();
   if (largestExtinction(function, low, high) == 0)
-    return fmt::format("the transfer function '{}' is fully transparent; choose another --tf",
+    return fmt::format("the transfer function '{}' is fully transparent; choose another --tf or --opacity",
                        function.name());
   return fmt::format(
       "over the range {}..{}, the transfer function '{}' is fully transparent for all values of {} (found "
@@ -53,12 +53,14 @@ std::string whyNothingIsVisible(const RenderedScene& scene) {
         "lie "
         "in one plane or line, or their neighbours are blanked ({} of {} samples are blanked)",
         manifest.splats, manifest.blanked_nodes, manifest.nodes);
+  const bool by_gradient = !scene.options.gradient_opacity.empty();
   if (s.splats_transparent + s.bricks_transparent > 0 && s.splats_drawn == 0)
     return fmt::format(
-        "the transfer function '{1}' is transparent for all visible values of {0}; move the camera, or "
+        "the transfer function '{}'{} is transparent for all visible values of {}; move the camera, or "
         "choose "
-        "another --range or --tf",
-        scene.variable.name, scene.transfer_function.name());
+        "another {}--range or --tf",
+        scene.transfer_function.name(), by_gradient ? " times --gradient-opacity" : "", scene.variable.name,
+        by_gradient ? "--gradient-opacity, " : "");
   if (manifest.blanked_nodes > 0 && s.splats_drawn == 0)
     return fmt::format(
         "the visible part of the data is blanked ({} of {} samples are); move the camera (--view iso), or "
