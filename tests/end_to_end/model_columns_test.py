@@ -72,7 +72,8 @@ class Columns(ModelFileTest):
                 kind, units = ("f8", "days since 2000-01-01") if name == "time" else ("S1", "")
                 f.add(name, dim, np.array(values, kind), kind, units=units)
                 f.add("t", f"{dim.split()[0]} face layer", np.zeros((3, 3, 4)), "f4", mesh="mesh", location="face")
-            self.assertEqual(self.info()["times"], times)
+            info = self.info("file.nc", "--time-step", "1")
+            self.assertEqual((info["times"], info["date"]), (times, "2000-01-01 06:00:00" if name == "time" else "2004-03-01 12:00:00"))
 
     def test_a_formula_that_lacks_a_term_is_named(self):
         with self.mesh() as f:
