@@ -184,11 +184,4 @@ std::optional<double> timeInUnit(double time, const TimeUnit& from, const TimeUn
   return (time * clock->seconds + later) / other->seconds;
 }
 
-std::optional<double> secondsBetween(const std::string& from, const std::string& to) {
-  const auto first = momentIn(from), second = momentIn(to);
-  if (!first || !second) return std::nullopt;
-  const int64_t days = daysOf(second->date, Calendar::kGregorian) - daysOf(first->date, Calendar::kGregorian);
-  return kSecondsPerDay * static_cast<double>(days) + second->seconds - first->seconds;
-}
-
 }  // namespace curvisplat

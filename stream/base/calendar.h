@@ -27,8 +27,4 @@ std::optional<std::string> dateOf(double time, const TimeUnit& unit);
 /// differ. Exact where the units count from the same moment in the same length.
 std::optional<double> timeInUnit(double time, const TimeUnit& from, const TimeUnit& to);
 
-/// Seconds from the first of two dates, "YYYY-MM-DD hh:mm:ss" with any character between the parts, to the
-/// second, in the proleptic Gregorian calendar; nullopt if either is not a date.
-std::optional<double> secondsBetween(const std::string& from, const std::string& to);
-
 }  // namespace curvisplat

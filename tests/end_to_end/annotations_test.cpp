@@ -212,6 +212,12 @@ TEST_F(Annotations, TextHasTheSizeThatIsAskedFor) {
       runProgram({"render", file("a.splats"), "-o", file("b.png"), "--axes", "--text-size", "2"});
   EXPECT_EQ(wrong.status, 2);
   expectSays(wrong.err, "--text-size 2: expected pixels from 4 to 1000");
+  for (const char* size : {"40", "41"}) {
+    const ProgramResult huge = run({"render", file("a.splats"), "-o", file("b.png"), "--size", "200x160",
+                                    "--scalar-bar", "--text-size", size});
+    EXPECT_EQ(huge.err.find("may not fit into 200x160 pixels") != std::string::npos,
+              size == std::string("41"));
+  }
 }
 
 TEST_F(Annotations, TextsSayWhatIsShown) {

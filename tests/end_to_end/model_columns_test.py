@@ -60,6 +60,21 @@ class Columns(ModelFileTest):
             else:
                 self.assertAlmostEqual(self.info()["bounds"]["lower"][2], low / 1000)
 
+    def test_times_with_another_name_than_their_dimension(self):
+        """Of a dimension that has no coordinate and no limit; MPAS' dates, in a calendar without leap days."""
+        dates = ["2004-02-28_12:00:00", "2004-03-01_12:00:00", "2005-02-28_12:00:01"]
+        for name, dim, values, times in (("time", "nt", [0.1, 0.25, 0.7], [0.1, 0.25, 0.7]), ("xtime", "Time width", [list(date.ljust(64)) for date in dates], [0, 86400, 365 * 86400 + 1])):
+            with self.mesh(at=None) as f:
+                f.config_calendar_type = "gregorian_noleap"
+                for further, length in (("nt", 3), ("Time", None), ("width", 64)):
+                    f.createDimension(further, length)
+                f.add("layer", "layer", MIDDLES, units="m", positive="up")
+                kind, units = ("f8", "days since 2000-01-01") if name == "time" else ("S1", "")
+                f.add(name, dim, np.array(values, kind), kind, units=units)
+                f.add("t", f"{dim.split()[0]} face layer", np.zeros((3, 3, 4)), "f4", mesh="mesh", location="face")
+            info = self.info("file.nc", "--time-step", "1")
+            self.assertEqual((info["times"], info["date"]), (times, "2000-01-01 06:00:00" if name == "time" else "2004-03-01 12:00:00"))
+
     def test_a_formula_that_lacks_a_term_is_named(self):
         with self.mesh() as f:
             f.add("layer_sigma", "layer", MIDDLES / 20, standard_name="ocean_sigma_coordinate", formula_terms="sigma: layer_sigma eta: s1 depth: nowhere")

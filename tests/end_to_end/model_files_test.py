@@ -299,10 +299,23 @@ class ModelFiles(ModelFileTest):
             f.add("XLAT", "south_north west_east", np.broadcast_to(np.linspace(0, 7, 8)[:, None], (8, 12)), units="degree_north")
             f.add("height", "height", [0.0, 1000], units="m", positive="up")
             f.add("Times", "Time DateStrLen", np.array([list(date) for date in dates], "S1"), "S1")
+            f.add("XTIME", "Time", [0, 180, 5760], "f4", units="minutes since 2005-08-28 00:00:00")  # less exact
             f.add("T", "Time height south_north west_east", RANDOM.random((3, 2, 8, 12)), "f4")
         info = self.info("file.nc", "--time-step", "2")
         self.assertEqual(info["times"], [0, 10800, 4 * 86400 + 30])
         self.assertEqual(info["date"], "2005-09-01 00:00:30")
+
+    def test_times_with_another_name_than_their_dimension(self):
+        """Of a dimension that has no coordinate; the start of each forecast, and times that fall, are left out."""
+        for length, time, others in ((None, [0.1, 0.25, 0.7], {}), (3, [0.1, 0.25, 0.7], {}), (3, [0, 1, 2], {"standard_name": "forecast_reference_time"}), (None, [0, 1, 2], {"scale_factor": -1.0})):
+            with self.subTest(f"{length} {others}"), self.file(lon=12, lat=8, height=2, nt=length) as f:
+                self.air(f)
+                f.add("height", "height", [0.0, 1000], units="m", positive="up")
+                f.add("time", "nt", [0.1, 0.25, 0.7], units="days since 2000-01-01", **others)
+                f.add("T", "nt height lat lon", RANDOM.random((3, 2, 8, 12)), "f4")
+            info = self.info("file.nc", "--time-step", "1")
+            self.assertEqual(info["times"], time)
+            self.assertEqual(info.get("date"), None if others else "2000-01-01 06:00:00")
 
     def test_land_that_is_zero_is_noticed(self):
         wet = RANDOM.random((7, 10)) > 0.3

@@ -240,6 +240,12 @@ TEST_F(RenderOptions, AnEmptyPictureIsExplained) {
                       kDefaultBackground),
       0u);
   expectSays(last_.err, "does not see the data's box");
+  render({"--opacity", "0:0,1:0"});
+  expectSays(last_.err, "is fully transparent; choose another --tf or --opacity");
+  render({"--gradient-opacity", "0:0,1:0"});
+  expectSays(last_.err, "times --gradient-opacity is transparent for all visible values");
+  render({"--zoom", "1e30"});
+  expectSays(last_.err, "splats are off the screen; try --view iso, or a smaller --zoom");
   render({"--opacity-unit", "1e12"}, "a.png");
   expectSays(last_.err, "--opacity-unit");
 }

@@ -207,6 +207,9 @@ TEST_F(SurfaceOptions, SaysWhyNoIsosurfaceIsSeen) {
       runProgram(render({"--volume", "off", "--iso", "0.5", "--focal-point", "900,0,0"}));
   expectSays(nothing.err, "no isosurface is in sight");
   expectSays(nothing.err, "asked for 0.5 of f, which goes from 0 to 0.995661.");
+  const ProgramResult clipped =
+      runProgram(render({"--volume", "off", "--iso", "0.5", "--clip-box", "95,96,95,96,95,96"}));
+  expectSays(clipped.err, "--clip-box contains none of the data");
 }
 
 /// A helix and a straight line, with the height and a number of the line as scalars, in every format.

@@ -171,6 +171,15 @@ TEST_F(SeriesFormats, FilesThatCountTheirTimesFromOtherDates) {
                  "since 2000-01-01', the unit of the steps before it"});
 }
 
+TEST_F(SeriesFormats, PartsOfTextFilesKeepTheirNumbersBesideTheCache) {
+  for (const char* name : {"c_0.vts", "c_1.vts"})
+    std::ofstream(file(name)) << vtsFile(annulusVtsGrid(5, 4, 3), {.format = VtsEncoding::Format::kAscii});
+  for (const char* part : {"1/2", "2/2"})
+    run({"convert", file("c_*.vts"), "--part", part, "-o", file("c.splats")});
+  run({"convert", file("c.splats.parts"), "--join", "-o", file("c.splats")});
+  EXPECT_EQ(timesOf(file("c.splats")).size(), 2u);
+}
+
 TEST_F(SeriesFormats, TimesAreThoseOfTheDataNotOfAGridFile) {
   writeHistory(file("his_0001.nc"), {1, 2});
   writeHistory(file("his_0002.nc"), {4});

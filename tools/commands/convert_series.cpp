@@ -241,7 +241,8 @@ void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>
   std::vector<StepFiles> own;
   for (const uint64_t place : places) own.push_back(steps[place]);
   ConvertArguments of_all = arguments;  // all parts have the same refinement
-  of_all.refinement = refinementOfSteps(arguments, partCache(folder, part), steps);
+  if (of_all.temporary_folder.empty()) of_all.temporary_folder = folderOf(folder);  // `folder` is made later
+  of_all.refinement = refinementOfSteps(of_all, partCache(folder, part), steps);
   SeriesInput input = seriesInput(of_all, own, steps);
   input.places = places;
   options.convert.output = partCache(folder, part);

@@ -11,7 +11,6 @@
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
-#include "stream/base/calendar.h"
 #include "stream/base/progress.h"
 #include "stream/base/text.h"
 #include "tools/commands/info_mesh.h"
@@ -76,29 +75,6 @@ std::string blankingRule(const GridDescription& description) {
   const bool any = std::any_of(description.blocks.begin(), description.blocks.end(),
                                [](const GridBlock& block) { return block.has_blanking; });
   return any ? "iblank is 0" : "";
-}
-
-std::optional<std::string> dateOfGridStep(const GridDescription& description, size_t step) {
-  if (step >= description.times.size()) return std::nullopt;
-  return dateOf(description.times[step], {description.time_unit, description.calendar});
-}
-
-/// "36 days since 1950-01-01 (1950-02-06 00:00:00)"
-std::string timeText(const GridDescription& description, size_t step) {
-  std::string text = numberText(description.times[step], 9);
-  if (!description.time_unit.empty()) text += fmt::format(" {}", description.time_unit);
-  if (const auto date = dateOfGridStep(description, step)) text += fmt::format(" ({})", *date);
-  return text;
-}
-
-void printTimes(const GridDescription& description) {
-  const size_t steps = description.times.size();
-  if (steps == 1 && !description.time_unit.empty()) printLine("time      {}", timeText(description, 0));
-  if (steps < 2) return;
-  printLine("times     {} steps, {} .. {}", steps, timeText(description, 0),
-            timeText(description, steps - 1));
-  printLine("time      {}; step {} was read", timeText(description, description.time_step),
-            description.time_step);
 }
 
 nlohmann::ordered_json blocksAsJson(const GridInfo& info) {
@@ -167,11 +143,7 @@ nlohmann::ordered_json gridAsJson(const GridInfo& info) {
                             {"reynolds", flow.reynolds},
                             {"time", flow.time}});
   if (!info.series.empty()) json["series"] = info.series;
-  json["times"] = description.times;
-  json["time_step"] = description.time_step;
-  if (!description.time_unit.empty()) json["time_unit"] = description.time_unit;
-  if (!description.calendar.empty()) json["calendar"] = description.calendar;
-  if (const auto date = dateOfGridStep(description, description.time_step)) json["date"] = *date;
+  addTimes(description, json);
   json["overlaps"] = nlohmann::ordered_json::array();
   for (const BlockOverlap& overlap : info.overlaps)
     json["overlaps"].push_back(

@@ -15,6 +15,7 @@
 #include "preprocess/convert/mesh_origin.h"
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/grid/node_reader.h"
+#include "stream/base/calendar.h"
 #include "stream/base/text.h"
 #include "tools/output/command_run.h"
 #include "tools/output/results.h"
@@ -41,6 +42,19 @@ std::string InfoEstimate::toText() const {
 }
 
 namespace {
+
+std::optional<std::string> dateOfStep(const GridDescription& description, size_t step) {
+  if (step >= description.times.size()) return std::nullopt;
+  return dateOf(description.times[step], {description.time_unit, description.calendar});
+}
+
+/// "36 days since 1950-01-01 (1950-02-06 00:00:00)"
+std::string timeText(const GridDescription& description, size_t step) {
+  std::string text = numberText(description.times[step], 9);
+  if (!description.time_unit.empty()) text += fmt::format(" {}", description.time_unit);
+  if (const auto date = dateOfStep(description, step)) text += fmt::format(" ({})", *date);
+  return text;
+}
 
 constexpr uint64_t kChunk = 65536;
 constexpr size_t kPiecesListed = 16;
@@ -168,8 +182,7 @@ nlohmann::ordered_json meshAsJson(const MeshInfo& info) {
     json["scalars"].push_back(std::move(scalar));
   }
   if (!info.series.empty()) json["series"] = info.series;
-  json["times"] = description.times;
-  json["time_step"] = description.time_step;
+  addTimes(description, json);
   json["estimate"] = info.estimate.toJson();
   json["notes"] = description.notes;
   json["warnings"] = info.warnings;
@@ -216,15 +229,29 @@ void printMeshAsText(const MeshInfo& info) {
       printLine("          {} of its values {} {}", info.not_finite[n],
                 info.not_finite[n] == 1 ? "is" : "are", notFiniteText(description));
   }
-  const size_t steps = description.times.size();
-  if (steps > 1)
-    printLine("times     {} steps, {} .. {}; step {} was read", steps,
-              numberText(description.times.front(), 9), numberText(description.times.back(), 9),
-              description.time_step);
+  printTimes(description);
   printLine("estimate  {}", info.estimate.toText());
 }
 
 }  // namespace
+
+void printTimes(const GridDescription& description) {
+  const size_t steps = description.times.size();
+  if (steps == 1 && !description.time_unit.empty()) printLine("time      {}", timeText(description, 0));
+  if (steps < 2) return;
+  printLine("times     {} steps, {} .. {}", steps, timeText(description, 0),
+            timeText(description, steps - 1));
+  printLine("time      {}; step {} was read", timeText(description, description.time_step),
+            description.time_step);
+}
+
+void addTimes(const GridDescription& description, nlohmann::ordered_json& json) {
+  json["times"] = description.times;
+  json["time_step"] = description.time_step;
+  if (!description.time_unit.empty()) json["time_unit"] = description.time_unit;
+  if (!description.calendar.empty()) json["calendar"] = description.calendar;
+  if (const auto date = dateOfStep(description, description.time_step)) json["date"] = *date;
+}
 
 void printMeshInfo(const MeshSource& source, const std::string& series, bool json) {
   MeshInfo info = inspectMesh(source);

@@ -1,6 +1,5 @@
-// `curvisplat info` of an unstructured grid, and the estimate of a conversion to come, which `info` of a
-// structured grid prints as well. The estimate is a formula; printMeshInfo() reads the whole mesh. For the
-// main thread.
+// `curvisplat info` of an unstructured grid, and the times and the estimate of a conversion to come, which `info` of a structured grid
+// prints as well. The estimate is a formula; printMeshInfo() reads the whole mesh. For the main thread.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -28,6 +27,12 @@ class InfoEstimate {
   unsigned threads_ = 1;
   ConversionEstimate needs_;
 };
+
+/// Prints the times of a grid's steps, if it has any, and which step was read.
+void printTimes(const GridDescription& description);
+
+/// Adds what printTimes() prints.
+void addTimes(const GridDescription& description, nlohmann::ordered_json& json);
 
 /// Reads the mesh and prints what is in it. Throws Error if its files are damaged.
 void printMeshInfo(const MeshSource& source, const std::string& series, bool json);

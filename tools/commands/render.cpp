@@ -210,6 +210,9 @@ void render(const RenderArguments& given) {
     printMessage("warning: {}", finer);
 
   const ImageSize picture = options.size;
+  if (4 * arguments.annotations.shown.text_size > std::min(picture.width, picture.height))
+    printMessage("warning: --text-size {}: texts may not fit into {}x{} pixels, or cover the data",
+                 *arguments.annotations.text_size, picture.width, picture.height);
   const std::vector<ShownFunction> functions = shownFunctions(
       arguments.annotations, scalars, manifest, options.scene.get(), arguments.surfaces.surface_by);
   options.size = dataSize(arguments.annotations.shown, picture, functions);

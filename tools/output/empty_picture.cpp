@@ -35,7 +35,7 @@ std::string whyTransparent(const RenderedScene& scene) {
   const TransferFunction& function = scene.transfer_function;
   const auto [low, high] = function.range();
   if (largestExtinction(function, low, high) == 0)
-    return fmt::format("the transfer function '{}' is fully transparent; choose another --tf",
+    return fmt::format("the transfer function '{}' is fully transparent; choose another --tf or --opacity",
                        function.name());
   return fmt::format(
       "over the range {}..{}, the transfer function '{}' is fully transparent for all values of {} (found "
@@ -53,17 +53,22 @@ std::string whyNothingIsVisible(const RenderedScene& scene) {
         "lie "
         "in one plane or line, or their neighbours are blanked ({} of {} samples are blanked)",
         manifest.splats, manifest.blanked_nodes, manifest.nodes);
+  const bool by_gradient = !scene.options.gradient_opacity.empty();
   if (s.splats_transparent + s.bricks_transparent > 0 && s.splats_drawn == 0)
     return fmt::format(
-        "the transfer function '{1}' is transparent for all visible values of {0}; move the camera, or "
+        "the transfer function '{}'{} is transparent for all visible values of {}; move the camera, or "
         "choose "
-        "another --range or --tf",
-        scene.variable.name, scene.transfer_function.name());
+        "another {}--range or --tf",
+        scene.transfer_function.name(), by_gradient ? " times --gradient-opacity" : "", scene.variable.name,
+        by_gradient ? "--gradient-opacity, " : "");
   if (manifest.blanked_nodes > 0 && s.splats_drawn == 0)
     return fmt::format(
         "the visible part of the data is blanked ({} of {} samples are); move the camera (--view iso), or "
         "convert again without --blank or iblank",
         manifest.blanked_nodes, manifest.nodes);
+  if (s.splats_off_screen > 0 && s.splats_off_screen == s.splats_read)
+    return fmt::format("all {} splats are off the screen; try --view iso, or a smaller --zoom",
+                       s.splats_read);
   return fmt::format(
       "of {} splats read, {} are outside --clip-box or --clip-plane, {} off the screen, {} transparent, and "
       "{} were drawn "
@@ -134,6 +139,16 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
   return true;
 }
 
+/// Names the options that leave nothing of the data; empty if they leave some.
+std::string whyAllIsClipped(const RenderedScene& scene) {
+  glm::dvec3 lower, upper;
+  if (visibleBox(scene, lower, upper)) return {};
+  return fmt::format(
+      "{} none of the data, which spans {} to {}",
+      scene.options.clip_planes.empty() ? "--clip-box contains" : "--clip-plane and --clip-box leave",
+      text(scene.manifest.lower), text(scene.manifest.upper));
+}
+
 /// Why nothing is seen of a scene without the volume.
 std::string whyNoSheetIsVisible(const SurfaceScene& sheets, const RenderedScene& scene) {
   const bool is_only_iso = sheets.surfaces.empty() && sheets.grid_surfaces.empty() && sheets.slices.empty() &&
@@ -141,6 +156,7 @@ std::string whyNoSheetIsVisible(const SurfaceScene& sheets, const RenderedScene&
   if (!is_only_iso)
     return "no surface, slice, line or isosurface is in sight, and --volume is off; try --view iso or "
            "another camera";
+  if (const std::string clipped = whyAllIsClipped(scene); !clipped.empty()) return clipped;
   std::vector<std::string> asked;
   const auto ask = [&](const std::vector<double>& values, const VariableInfo& of) {
     if (!values.empty())
@@ -165,10 +181,7 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
 
   glm::dvec3 lower, upper;
   if (!visibleBox(scene, lower, upper)) {
-    reasons.push_back(fmt::format(
-        "{} none of the data, which spans {} to {}",
-        scene.options.clip_planes.empty() ? "--clip-box contains" : "--clip-plane and --clip-box leave",
-        text(scene.manifest.lower), text(scene.manifest.upper)));
+    reasons.push_back(whyAllIsClipped(scene));
   } else {
     const bool out_of_view = outOfView(scene, lower, upper);
     if (out_of_view)

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <iterator>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,11 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
                                     std::vector<std::string>& warnings) {
   std::vector<ColumnsScalars> groups;
   Variables flat;
+  std::set<size_t> timed;  // dimensions of times
+  for (const NetcdfVariable& variable : file.variables())
+    if (variable.dims.size() == 1 && isTimeAlong(file, variable, variable.dims[0]))
+      timed.insert(variable.dims[0]);
+  for (const size_t dim : {map.face_dim, map.node_dim}) timed.erase(dim);
   for (const NetcdfVariable& variable : file.variables()) {
     if (!variable.numeric || !variable.text("cf_role").empty()) continue;
     const bool faces = hasDimension(variable, map.face_dim);
@@ -72,9 +78,8 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
     std::optional<size_t> time;
     for (size_t axis = 0; axis < variable.dims.size(); ++axis) {
       const NetcdfDimension& dimension = file.dimension(variable, axis);
-      const NetcdfVariable* const coordinate = file.find(dimension.name);
       const bool is_time = dimension.unlimited || dimension.name == "time" || dimension.name == "Time" ||
-                           (coordinate && cfRole(file, *coordinate) == CfRole::kTime);
+                           timed.contains(variable.dims[axis]);
       if (is_time)
         time = variable.dims[axis];
       else if (variable.dims[axis] != across && dimension.length != 1)

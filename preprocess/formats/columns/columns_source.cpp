@@ -83,16 +83,12 @@ ColumnsSource::ColumnsSource(const OpenGridOptions& options)
 void ColumnsSource::findTimes(const OpenGridOptions& options) {
   if (scalars_.time_dim) {
     const NetcdfDimension& dimension = file_.dimensions()[*scalars_.time_dim];
-    description_.times.resize(dimension.length);
-    for (size_t n = 0; n < dimension.length; ++n) description_.times[n] = static_cast<double>(n);
-    const NetcdfVariable* const time = file_.find(dimension.name);
-    if (time && time->numeric && time->dims == std::vector{*scalars_.time_dim} && dimension.length > 0) {
-      file_.read(*time, {{0}, {dimension.length}}, std::span(description_.times));
-      description_.time_unit = time->text("units");
-      description_.calendar = time->text("calendar");
-    }
     if (dimension.length == 0)
       throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(), dimension.name);
+    const CfTimes times = cfTimes(file_, *scalars_.time_dim, *scalars_.variables.front());
+    description_.times = times.values;
+    description_.time_unit = times.unit;
+    description_.calendar = times.calendar;
   }
   description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
 }

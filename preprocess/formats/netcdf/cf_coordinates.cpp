@@ -102,6 +102,11 @@ CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
   return named;
 }
 
+bool isTimeAlong(const NetcdfFiles& file, const NetcdfVariable& variable, size_t dim) {
+  return variable.dims == std::vector{dim} && cfRole(file, variable) == CfRole::kTime &&
+         isOneOf(lowerCase(variable.text("standard_name")), {"", "time"});
+}
+
 bool isUnitless(const std::string& unit) {
   return isOneOf(lowerCase(unit), {"", "1", "-", "none", "unitless", "dimensionless", "nondimensional",
                                    "non-dimensional", "nondim", "[-]"});

@@ -31,6 +31,10 @@ enum class CfRole {
 /// Source: CF conventions 1.10, chapter 4.
 CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable);
 
+/// Whether a variable is along one dimension alone and has its times, whatever it is called: `time` along `t`, but not the start of
+/// each forecast.
+bool isTimeAlong(const NetcdfFiles& file, const NetcdfVariable& variable, size_t dim);
+
 /// Whether a name, a unit or a meaning is one of these words.
 bool isOneOf(std::string_view text, std::initializer_list<std::string_view> words);
 

@@ -485,42 +485,73 @@ bool isOcean(const NetcdfFiles& file, const CfGrid& grid) {
   return column.front() + column.back() < 0;
 }
 
-CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
+namespace {
+
+CfTimes numbersOfSteps(uint64_t count) {
   CfTimes times;
-  if (!grid.dims.time) return times;
-  const NetcdfDimension& time = file.dimensions()[*grid.dims.time];
-  times.values.resize(time.length);
-  for (size_t n = 0; n < time.length; ++n) times.values[n] = static_cast<double>(n);
-  const NetcdfVariable* const coordinate = file.coordinateOf(*grid.dims.time, *grid.variables.front());
-  if (coordinate && coordinate->numeric) {
-    std::vector<double> stored(time.length);
-    file.read(*coordinate, {{0}, {time.length}}, stored);
-    // The values of members or months need not increase; times that do not are refused where they are used.
-    const auto falls = [](double a, double b) { return !(a < b); };
-    if (!grid.steps_of.empty() && std::adjacent_find(stored.begin(), stored.end(), falls) != stored.end())
-      return times;
-    times.values = stored;
-    times.unit = coordinate->text("units");
-    times.calendar = lowerCase(coordinate->text("calendar"));
-    return times;
-  }
-  const NetcdfVariable* const dates = file.find("Times");
-  if (!dates || dates->dims.size() != 2 || dates->dims[0] != *grid.dims.time || time.length == 0)
-    return times;
-  const std::string text = file.readText(*dates);
-  const size_t length = text.size() / time.length;
-  if (length == 0) return times;
-  std::vector<double> seconds;
-  for (size_t n = 0; n < time.length; ++n)
-    if (const auto since = secondsBetween(text.substr(0, length), text.substr(n * length, length)))
-      seconds.push_back(*since);
-  if (seconds.size() != time.length) return times;
-  times.values = seconds;
-  std::string first = text.substr(0, length);
-  std::replace(first.begin(), first.end(), '_', ' ');
-  times.unit = fmt::format("seconds since {}", first.substr(0, first.find('\0')));
-  times.calendar = "proleptic_gregorian";
+  for (uint64_t n = 0; n < count; ++n) times.values.push_back(static_cast<double>(n));
   return times;
+}
+
+bool increase(const std::vector<double>& times) {
+  return std::ranges::adjacent_find(times, [](double a, double b) { return !(a < b); }) == times.end();
+}
+
+CfTimes timesIn(const NetcdfFiles& file, const NetcdfVariable& variable, uint64_t count) {
+  CfTimes times{std::vector<double>(count), variable.text("units"), lowerCase(variable.text("calendar"))};
+  file.read(variable, {{0}, {count}}, times.values);
+  return times;
+}
+
+/// Seconds since the first of the dates in WRF's Times or MPAS' xtime; without values if there are none.
+CfTimes timesInDates(const NetcdfFiles& file, size_t dim) {
+  const size_t count = file.dimensions()[dim].length;
+  const NetcdfVariable* dates = file.find("Times");
+  if (!dates) dates = file.find("xtime");
+  if (!dates || dates->dims.size() != 2 || dates->dims[0] != dim || count == 0) return {};
+  const std::string text = file.readText(*dates);
+  const size_t length = text.size() / count;
+  if (length == 0) return {};
+  const std::string of_mpas = lowerCase(file.text("config_calendar_type"));
+  CfTimes times;
+  times.calendar = of_mpas.find("noleap") != std::string::npos ? "noleap"
+                   : of_mpas.starts_with("360")                ? "360_day"
+                                                               : "proleptic_gregorian";
+  for (size_t n = 0; n < count; ++n) {
+    std::string date = text.substr(n * length, length);
+    date.resize(std::min(date.find('\0'), date.size()));
+    std::ranges::replace(date, '_', ' ');
+    const std::string unit = "seconds since " + date.substr(0, date.find_last_not_of(' ') + 1);
+    if (n == 0) times.unit = unit;
+    const auto since = timeInUnit(0, {unit, times.calendar}, {times.unit, times.calendar});
+    if (!since) return {};
+    times.values.push_back(*since);
+  }
+  return times;
+}
+
+}  // namespace
+
+CfTimes cfTimes(const NetcdfFiles& file, size_t dim, const NetcdfVariable& data) {
+  const size_t count = file.dimensions()[dim].length;
+  const NetcdfVariable* const coordinate = file.coordinateOf(dim, data);
+  if (coordinate && coordinate->numeric) return timesIn(file, *coordinate, count);
+  if (const CfTimes times = timesInDates(file, dim); !times.values.empty()) return times;
+  const NetcdfVariable* other = nullptr;  // such as time along t
+  for (const NetcdfVariable& variable : file.variables())
+    if (isTimeAlong(file, variable, dim) &&
+        (!other || (variable.file == data.file && other->file != data.file)))
+      other = &variable;
+  if (other)
+    if (const CfTimes times = timesIn(file, *other, count); increase(times.values)) return times;
+  return numbersOfSteps(count);
+}
+
+CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
+  if (!grid.dims.time) return {};
+  const CfTimes times = cfTimes(file, *grid.dims.time, *grid.variables.front());
+  // The values of members or months need not increase; times that do not are refused where they are used.
+  return grid.steps_of.empty() || increase(times.values) ? times : numbersOfSteps(times.values.size());
 }
 
 }  // namespace curvisplat

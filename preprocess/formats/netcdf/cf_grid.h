@@ -69,8 +69,11 @@ struct CfTimes {
   std::string unit, calendar;  // "days since 1950-01-01"; may be empty
 };
 
-/// The time of every step of a grid: values of the time coordinate, seconds since the first of WRF's Times, or
-/// 0, 1, ... if there is neither.
+/// The times along a dimension of `data`: the values of its coordinate; seconds since the first date of WRF's Times or MPAS' xtime;
+/// the values of another variable of times along it alone, if they increase; or 0, 1, ... if there are none.
+CfTimes cfTimes(const NetcdfFiles& file, size_t dim, const NetcdfVariable& data);
+
+/// The time of every step of a grid. Empty if the grid has no time dimension.
 CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid);
 
 }  // namespace curvisplat
