@@ -241,6 +241,11 @@ def grids():
     levels = lattice(np.linspace(0, 10, 26), np.linspace(0, 8, 21), -growing(0.05, 1.2, 14), lambda x, y, z: (x, y, z))
     yield "sea_floor", [with_land(*nodes(levels, lambda x, y, z: z + 0.2 * x))]
     yield "sea_floor_cells", [with_land(*cells(levels, lambda x, y, z: z + 0.2 * x))]
+    hexahedra = cell_corners(layers)
+    yield "terrain_mesh", [(hexahedra, hexahedra[..., 2])]
+    hexahedra = cell_corners(lattice(1 + radial, np.linspace(0, 1.5 * np.pi, 31), np.linspace(0, 3, 5), polar))
+    yield "omesh_mesh", [(hexahedra, hexahedra[..., 2])]
+    yield "omesh_mesh_cells", [(hexahedra, hexahedra[..., 2].mean(axis=1))]
     octree = refined_mesh(8, 2)
     yield "octree", [(octree, octree[..., 2])]
     yield "octree_cells", [(octree, octree[..., 2].mean(axis=1))]
@@ -429,13 +434,13 @@ def main():
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     rows, missed = [], []
-    print(f"{'grid':<14} {'weights':>8} {'uniform, views':>16} {'above middle':>16} {'rms %':>6} {'p98/p2':>6} {'of 255':>6} {'outside %':>9} "
+    print(f"{'grid':<16} {'weights':>8} {'uniform, views':>16} {'above middle':>16} {'rms %':>6} {'p98/p2':>6} {'of 255':>6} {'outside %':>9} "
           f"{'beyond %':>8} {'splats':>8}")
     for name, blocks in grids():
         if not re.search(arguments.only, name) or (arguments.quick and name not in LIMITS):
             continue
         row = measure(arguments, name, blocks)
-        print(f"{name:<14} {row['weights']:8.5f} {row['uniform'][0]:7.4f} {row['uniform'][1]:8.4f} {row['above'][0]:7.3f} "
+        print(f"{name:<16} {row['weights']:8.5f} {row['uniform'][0]:7.4f} {row['uniform'][1]:8.4f} {row['above'][0]:7.3f} "
               f"{row['above'][1]:8.3f} {row['rms_percent']:6.2f} {row['p98_over_p2']:6.3f} {row['worst_255']:6.1f} {row['outside_percent']:9.3f} "
               f"{row['beyond_percent']:8.3f} {row['splats']:8d}", flush=True)
         rows.append(row)

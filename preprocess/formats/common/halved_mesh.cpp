@@ -133,8 +133,8 @@ const std::vector<PartShares>& sharesOf(CellKind shape) {
         const std::span<const uint64_t> at = cells.cornersOfCell(part);
         // The pyramids in a pyramid have twice the volume of the tetrahedra.
         const bool is_small = kind == CellKind::kPyramid && cells.shapes[part] == CellKind::kTetrahedron;
-        PartShares& shares = of_shapes[kind].emplace_back(is_small ? 0.5 : 1.0);
-        shares.of_corners.resize(cornersOf(kind));
+        of_shapes[kind].push_back({is_small ? 0.5 : 1.0, std::vector<double>(cornersOf(kind))});
+        PartShares& shares = of_shapes[kind].back();
         const auto add = [&](size_t corner, size_t among) {
           shares.of_corners[corner] += 1.0 / static_cast<double>(among * at.size());
         };
@@ -340,13 +340,15 @@ void HalvedMesh::readCells(uint32_t piece, uint64_t first, uint64_t count, std::
   out.scalars.resize(scalars.size());
   for (std::vector<float>& values : out.scalars) values.clear();
   if (count == 0) return;
-  const auto& [middles, points, added, begins] = pieces_[piece];
+  const std::vector<Middle>& middles = pieces_[piece].middles;
+  const std::vector<uint64_t>& begins = pieces_[piece].begins;
   const auto cellOf = [&](uint64_t part) {
     return static_cast<uint64_t>(std::upper_bound(begins.begin(), begins.end(), part) - begins.begin()) - 1;
   };
   const uint64_t cell = cellOf(first), end = cellOf(first + count - 1) + 1;
   MeshCells whole;
   source().readCells(piece, cell, end - cell, scalars, whole);
+  checkCells(whole, source().description().pieces[piece], cell);
   std::vector<std::shared_ptr<const PointMeans>> means;
   for (const uint32_t scalar : scalars) means.push_back(meansOf(piece, scalar));
   std::vector<uint64_t> nodes;
@@ -354,18 +356,22 @@ void HalvedMesh::readCells(uint32_t piece, uint64_t first, uint64_t count, std::
     const bool is_halved = isHalved(whole, n);
     const CellParts* const parts = is_halved ? &partsOf(whole.shapes[n], kHalved) : nullptr;
     const uint64_t begin = begins[cell + n], next = begins[cell + n + 1];
-    if ((parts ? parts->size() : 1) != next - begin)
-      throw Error("{}: cell {} is another one than before; the file has been replaced",
-                  description_.pieces[piece].file, cell + n);
+    bool is_as_before = (parts ? parts->size() : 1) == next - begin;
     if (is_halved) {
       const auto corners = whole.cornersOfCell(n);
       nodes.assign(corners.begin(), corners.end());
       for (const auto& between : middlesOf(whole.shapes[n])) {
         const Middle middle = middleOf(between, corners);
         const auto found = std::lower_bound(middles.begin(), middles.end(), middle);
-        nodes.push_back(isCorner(middle) ? middle[0] : points[static_cast<size_t>(found - middles.begin())]);
+        const bool is_known = found != middles.end() && *found == middle;
+        is_as_before &= is_known || isCorner(middle);
+        nodes.push_back(is_known ? pieces_[piece].points[static_cast<size_t>(found - middles.begin())]
+                                 : middle[0]);
       }
     }
+    if (!is_as_before)
+      throw Error("{}: cell {} is another one than before; the file has been replaced",
+                  description_.pieces[piece].file, cell + n);
     const std::pair wanted(std::max(first, begin) - begin, std::min(first + count, next) - begin);
     for (uint64_t part = wanted.first; part < wanted.second; ++part) {
       if (parts)
