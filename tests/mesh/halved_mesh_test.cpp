@@ -1,5 +1,5 @@
 // Meshes whose cells are cut into halves along each edge.
-#include "preprocess/formats/common/halved_mesh.h"
+#include "preprocess/gather/halved_mesh.h"
 
 #include <gtest/gtest.h>
 

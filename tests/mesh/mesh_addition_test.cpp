@@ -11,7 +11,7 @@
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
-#include "preprocess/formats/common/halved_mesh.h"
+#include "preprocess/gather/halved_mesh.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"

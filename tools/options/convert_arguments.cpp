@@ -18,9 +18,9 @@
 #include <system_error>
 #include <utility>
 
-#include "preprocess/formats/common/halved_mesh.h"
 #include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/derived/derived_source.h"
+#include "preprocess/gather/halved_mesh.h"
 #include "preprocess/gradients/gradient_mesh.h"
 #include "preprocess/grid/grid_views.h"
 #include "preprocess/grid/parallel.h"

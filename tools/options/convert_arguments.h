@@ -87,7 +87,7 @@ std::unique_ptr<DataSource> refinedBy(const Refinement& refinement, std::unique_
                                       std::optional<double> blank_value);
 
 /// The refinement by need of a grid (preprocess/survey/cell_bends.h), or of an unstructured one
-/// (preprocess/formats/common/halved_mesh.h). `threads`: at most, or 0.
+/// (preprocess/gather/halved_mesh.h). `threads`: at most, or 0.
 Refinement refinementByNeed(const DataSource& source, const std::vector<uint32_t>& scalars, unsigned threads,
                             std::optional<double> blank_value);
 /// Says that cells are cut, and that `how_to_avoid` leaves them whole; empty if none are.

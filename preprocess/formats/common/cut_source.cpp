@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/formats/common/cell_nodes.h"
 #include "preprocess/formats/common/spool_file.h"
+#include "preprocess/mesh/cell_nodes.h"
 #include "preprocess/mesh/curved_cells.h"
 #include "preprocess/mesh/curved_volumes.h"
 #include "preprocess/mesh/forwarding_mesh.h"

@@ -1,4 +1,4 @@
-#include "preprocess/formats/common/cell_nodes.h"
+#include "preprocess/mesh/cell_nodes.h"
 
 #include <algorithm>
 

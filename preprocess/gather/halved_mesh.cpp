@@ -1,4 +1,4 @@
-#include "preprocess/formats/common/halved_mesh.h"
+#include "preprocess/gather/halved_mesh.h"
 
 #include <fmt/format.h>
 
@@ -16,16 +16,17 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/formats/common/cell_nodes.h"
+#include "preprocess/mesh/cell_nodes.h"
 #include "preprocess/mesh/curved_cells.h"
 #include "preprocess/mesh/forwarding_mesh.h"
+#include "preprocess/moments/cell_moments.h"
 #include "stream/base/error.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kCellsAtOnce = 4096, kMaxPoints = 10 * kMaxHalved;  // of a piece
+constexpr uint64_t kCellsRead = 4096, kMaxPoints = 10 * kMaxHalved;  // of a piece
 constexpr size_t kMiddlesAtOnce = size_t{1} << 20, kMiddlesReadAtOnce = 65536;
 
 /// The corners that a new point is the middle of, rising; the rest kNone.
@@ -153,24 +154,6 @@ const std::vector<PartShares>& sharesOf(CellKind shape) {
   return known.at(shape);
 }
 
-/// The volume of a cell, without sign: of tetrahedra between its middle, a face's and an edge.
-double volumeOf(CellKind shape, std::span<const glm::dvec3> corners) {
-  glm::dvec3 middle(0.0);
-  for (const glm::dvec3& corner : corners) middle += corner / static_cast<double>(corners.size());
-  const std::span<const uint32_t> faces = facesOf(shape, {});
-  double volume = 0;
-  for (size_t at = 0; at < faces.size(); at += faces[at] + 1) {
-    const auto face = faces.subspan(at + 1, faces[at]);
-    glm::dvec3 of_face = -middle;
-    for (const uint32_t corner : face) of_face += corners[corner] / static_cast<double>(face.size());
-    for (size_t n = 0; n < face.size(); ++n) {
-      const glm::dvec3 a = corners[face[n]] - middle, b = corners[face[(n + 1) % face.size()]] - middle;
-      volume += std::abs(glm::dot(glm::cross(a, b), of_face)) / 6;
-    }
-  }
-  return volume;
-}
-
 /// A piece's new points and parts.
 struct HalvedPiece {
   std::vector<Middle> middles;      // sorted
@@ -239,8 +222,8 @@ HalvedPiece HalvedMesh::measured(uint32_t piece) const {
   std::vector<Middle>& middles = found.middles;
   size_t united = 0;
   MeshCells cells;
-  for (uint64_t first = 0; first < whole.cells; first += kCellsAtOnce) {
-    const uint64_t count = std::min(kCellsAtOnce, whole.cells - first);
+  for (uint64_t first = 0; first < whole.cells; first += kCellsRead) {
+    const uint64_t count = std::min(kCellsRead, whole.cells - first);
     source().readCells(piece, first, count, {}, cells);
     checkCells(cells, whole, first);
     for (size_t n = 0; n < count; ++n) {
@@ -398,8 +381,8 @@ PointMeans HalvedMesh::computedMeans(uint32_t piece, uint32_t scalar) const {
   std::vector<double> sums(whole.points, 0.0);
   std::vector<uint32_t> counts(whole.points, 0);
   MeshCells cells;
-  for (uint64_t first = 0; first < whole.cells; first += kCellsAtOnce) {
-    const uint64_t count = std::min(kCellsAtOnce, whole.cells - first);
+  for (uint64_t first = 0; first < whole.cells; first += kCellsRead) {
+    const uint64_t count = std::min(kCellsRead, whole.cells - first);
     source().readCells(piece, first, count, std::span(&scalar, 1), cells);
     checkCells(cells, whole, first);
     for (size_t n = 0; n < count; ++n) {
@@ -468,7 +451,8 @@ void addPiece(const MeshSource& source, uint32_t piece, Unevenness& to) {
   std::vector<double> volumes(cells.size(), 0.0);
   for (const auto& [n, curve] : cells.curved) {
     const std::span<const uint64_t> corners = cells.cornersOfCell(n);
-    volumes[n] = volumeOf(cells.shapes[n], nodes.of(cells.shapes[n], curve, corners).places);
+    const NodesOfCell of_cell = nodes.of(cells.shapes[n], curve, corners);
+    volumes[n] = bodyOf({cells.shapes[n], of_cell.places, {}, {}}).volume;
     for (const uint64_t corner : corners) {
       at_points[corner].first += volumes[n];
       ++at_points[corner].second;
