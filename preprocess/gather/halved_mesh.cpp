@@ -290,9 +290,9 @@ void HalvedMesh::readMiddles(uint32_t piece, std::span<const Middle> middles,
   std::vector<size_t> order;
   for (size_t n = 0; n < middles.size(); ++n) {
     const NodesOfCell nodes = known.of(CellKind::kPolyhedron, kHalved, around.cornersOfCell(n));
-    // In the order of places, so that the sum has the same bits in all pieces.
+    // Corners are summed in the order of their places, so that the sum has the same bits in all pieces.
     order.resize(nodes.places.size());
-    for (size_t corner = 0; corner < order.size(); ++corner) order[corner] = corner;
+    std::iota(order.begin(), order.end(), size_t{0});
     std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
       const glm::dvec3 &p = nodes.places[a], &q = nodes.places[b];
       return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z);

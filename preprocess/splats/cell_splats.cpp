@@ -162,9 +162,10 @@ Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cel
   const auto& edge = scratch_.edge;
   glm::dvec3 normal(0.0);
   if (by_widths_) normal = glm::cross(edge[(axis + 1) % 3][cell], edge[(axis + 2) % 3][cell]);
-  const auto before = [&](size_t steps) { return squaredAcross(edge[axis][cell - steps * stride], normal); };
-  const auto after = [&](size_t steps) { return squaredAcross(edge[axis][cell + steps * stride], normal); };
-  const double own = before(0);
+  const auto squared = [&](size_t at) { return squaredAcross(edge[axis][at], normal); };
+  const auto before = [&](size_t steps) { return squared(cell - steps * stride); };
+  const auto after = [&](size_t steps) { return squared(cell + steps * stride); };
+  const double own = squared(cell);
   if (!is_there(1, 0)) {
     if (!is_there(0, 2)) return {};
     const double near = after(1), far = after(2), steady = steadyGrowth(own, near, far);
