@@ -262,7 +262,8 @@ void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& in
 
 // ------------------------------------------------------------------------------------------- markers
 
-/// Draws a dot at each point, whatever lies before it, and the text in a dark box at its right, as the window does.
+/// Draws a dot at each point, whatever lies before it, and the text in a dark box beside it, as the window does: at its right, or at its
+/// left where the box has room there alone.
 void drawMarkers(cairo_t* cairo, const AnnotatedScene& scene) {
   constexpr glm::dvec3 kLight(1.0), kDark(0.0);
   const ScreenView& view = scene.view;
@@ -282,9 +283,11 @@ void drawMarkers(cairo_t* cairo, const AnnotatedScene& scene) {
     if (marker.text.empty()) continue;
     cairo_text_extents_t text;
     cairo_text_extents(cairo, marker.text.c_str(), &text);
-    const double height = line.ascent + line.descent, left = at.x + 1.5 * radius, top = at.y - 0.5 * height;
+    const double height = line.ascent + line.descent, width = text.x_advance + 2 * margin, away = 1.5 * radius;
+    const bool at_left = at.x + away + width > view.size.width && at.x - away - width >= 0;
+    const double left = at_left ? at.x - away - width : at.x + away, top = at.y - 0.5 * height;
     setInk(cairo, kDark, 0.67);
-    cairo_rectangle(cairo, left, top, text.x_advance + 2 * margin, height);
+    cairo_rectangle(cairo, left, top, width, height);
     cairo_fill(cairo);
     setInk(cairo, kLight);
     cairo_move_to(cairo, left + margin, top + line.ascent);

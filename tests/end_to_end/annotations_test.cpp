@@ -275,6 +275,10 @@ TEST_F(Annotations, AMarkerStandsAtItsPointWithItsTextBesideIt) {
   EXPECT_GT(changed(dot, text, kX + kReach, 200, kY - 8, kY + 8), 60);
   EXPECT_EQ(changed(dot, text, 0, kX, 0, 160), 0);
   EXPECT_EQ(changed(dot, text, 0, 200, 0, kY - 8) + changed(dot, text, 0, 200, kY + 8, 160), 0);
+  // A text that would reach beyond the right border stands at the left.
+  const Image longer = seen({"--marker", "1,0.5,0:stagnation point"});
+  EXPECT_GT(changed(dot, longer, 0, kX, kY - 8, kY + 8), 60);
+  EXPECT_EQ(changed(dot, longer, kX + kReach, 200, 0, 160), 0);
   EXPECT_EQ(changed(plain, seen({"--marker", "1,0.5,0", "--marker", "-1,-0.5,0"}), 96, 104, 96, 104), 0);
   EXPECT_GT(changed(plain, seen({"--marker", "1,0.5,0", "--marker", "-1,-0.5,0"}), 56, 64, 96, 104), 12);
   // Stretched, the data's point lies further up.

@@ -307,7 +307,10 @@ void drawMarkerSigns(const ViewState& state, const PlaceInWindow& place) {
     list->AddCircleFilled(centre, 0.7f * radius, line);
     const std::string text = signOf(marker, state.variable);
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
-    const ImVec2 lower(centre.x + 1.5f * radius, centre.y - 0.5f * size.y);
+    const float away = 1.5f * radius;
+    const bool at_left = centre.x + away + size.x + 3 > list->GetClipRectMax().x &&
+                         centre.x - away - size.x - 3 >= list->GetClipRectMin().x;
+    const ImVec2 lower(at_left ? centre.x - away - size.x : centre.x + away, centre.y - 0.5f * size.y);
     list->AddRectFilled({lower.x - 3, lower.y - 1}, {lower.x + size.x + 3, lower.y + size.y + 1},
                         IM_COL32(0, 0, 0, 170), 3);
     list->AddText(lower, line, text.c_str());
