@@ -26,17 +26,17 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kCellsRead = 4096, kMaxPoints = 10 * kMaxHalved;  // of a piece
-constexpr size_t kMiddlesAtOnce = size_t{1} << 20, kMiddlesReadAtOnce = 65536;
+constexpr uint64_t kCellsReadAtOnce = 4096;
+constexpr size_t kMiddlesUnitedAtOnce = size_t{1} << 20, kMiddlesReadAtOnce = 65536;
 
-/// The corners that a new point is the middle of, rising; the rest kNone.
+/// The corners that a new point is the middle of, rising; the rest kNoCorner.
 using Middle = std::array<uint32_t, 8>;
-constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNoCorner = std::numeric_limits<uint32_t>::max();
 
-/// Repeated corners count once if all are repeated equally often, as the cells beside such a cell have them.
+/// Repeated corners count once if all are repeated equally often: a collapsed face {a, a, b, b} is the edge {a, b} of the cells beside it.
 Middle middleOf(std::span<const uint8_t> between, std::span<const uint64_t> corners) {
   Middle middle;
-  middle.fill(kNone);
+  middle.fill(kNoCorner);
   for (size_t n = 0; n < between.size(); ++n) middle[n] = static_cast<uint32_t>(corners[between[n]]);
   const auto end = middle.begin() + static_cast<ptrdiff_t>(between.size());
   std::sort(middle.begin(), end);
@@ -44,13 +44,13 @@ Middle middleOf(std::span<const uint8_t> between, std::span<const uint64_t> corn
   if (times > 1 && std::all_of(middle.begin(), end, [&](uint32_t corner) {
         return std::count(middle.begin(), end, corner) == times;
       }))
-    std::fill(std::unique(middle.begin(), end), end, kNone);
+    std::fill(std::unique(middle.begin(), end), end, kNoCorner);
   return middle;
 }
 
-/// Whether it is one of the corners.
+/// Whether all corners of the middle are one point.
 bool isCorner(const Middle& middle) {
-  return middle[1] == kNone;
+  return middle[1] == kNoCorner;
 }
 
 void sortAndUnite(std::vector<Middle>& middles) {
@@ -58,7 +58,8 @@ void sortAndUnite(std::vector<Middle>& middles) {
   middles.erase(std::unique(middles.begin(), middles.end()), middles.end());
 }
 
-bool isHalved(const MeshCells& cells, size_t n) {
+/// Polyhedra cannot, nor parts of curved cells: their volumes are the file's, not those of their corners.
+bool canBeHalved(const MeshCells& cells, size_t n) {
   return cornersOf(cells.shapes[n]) > 0 && (cells.volumes.empty() || !(cells.volumes[n] > 0));
 }
 
@@ -73,44 +74,57 @@ class PointsByPlace {
       source.readPoints(piece, first, std::min(kPointsAtOnce, count - first), {}, points);
       for (size_t n = 0; n < points.x.size(); ++n) {
         places_.emplace_back(points.x[n], points.y[n], points.z[n]);
+        if (!isFinite(places_.back())) continue;
         const glm::dvec3 size = glm::abs(places_.back());
         largest = std::max({largest, size.x, size.y, size.z});
       }
     }
-    reach_ = largest * std::numeric_limits<float>::epsilon();
+    reach_ = 2 * largest * std::numeric_limits<float>::epsilon();
     for (size_t n = 0; n < places_.size(); ++n) {
+      if (!isFinite(places_[n])) continue;
       const auto [at, is_new] = known_.try_emplace(boxOf(places_[n]), static_cast<uint32_t>(n));
-      if (!is_new) at->second = kNone;
+      if (!is_new) at->second = kNoPoint;
     }
   }
 
-  /// The point at `place`, the middle between `corner` and others, to a hundredth of the way. kNone: none is there, or several are,
-  /// as on the two sides of a thin wall.
+  static constexpr uint32_t kNoPoint = std::numeric_limits<uint32_t>::max();
+
+  /// The point at `place`, the middle between `corner` and others, to a hundredth of the way. kNoPoint: none is there, or several
+  /// are, as on the two sides of a thin wall.
   uint32_t at(const glm::dvec3& place, uint32_t corner) const {
-    const double most = std::min(2 * reach_, 0.01 * glm::distance(place, places_[corner]));
-    for (int side = 0; side < 8; ++side) {
+    const double most = std::min(reach_, 0.01 * glm::distance(place, places_[corner]));
+    uint32_t found = kNoPoint;
+    if (!isFinite(place)) return found;
+    for (int side = 0; side < 8; ++side) {  // all boxes within reach: a box is twice as wide
       const glm::dvec3 to((side & 1) != 0 ? reach_ : -reach_, (side & 2) != 0 ? reach_ : -reach_,
                           (side & 4) != 0 ? reach_ : -reach_);
-      const auto found = known_.find(boxOf(place + to));
-      if (found == known_.end()) continue;
-      const uint32_t point = found->second;
-      return point != kNone && glm::distance(place, places_[point]) <= most ? point : kNone;
+      const auto box = known_.find(boxOf(place + to));
+      if (box == known_.end()) continue;
+      const uint32_t point = box->second;
+      if (point == kNoPoint) return kNoPoint;
+      if (point == found || glm::distance(place, places_[point]) > most) continue;
+      if (found != kNoPoint) return kNoPoint;
+      found = point;
     }
-    return kNone;
+    return found;
   }
 
  private:
   static constexpr uint64_t kPointsAtOnce = 65536;
   using Box = std::array<int64_t, 3>;
 
+  static bool isFinite(const glm::dvec3& place) {
+    return std::isfinite(place.x) && std::isfinite(place.y) && std::isfinite(place.z);
+  }
   Box boxOf(const glm::dvec3& place) const {
-    const double edge = reach_ > 0 ? 4 * reach_ : 1;
-    return {std::llround(place.x / edge), std::llround(place.y / edge), std::llround(place.z / edge)};
+    const double edge = reach_ > 0 ? 2 * reach_ : 1;
+    const glm::dvec3 box = glm::floor(place / edge);
+    return {static_cast<int64_t>(box.x), static_cast<int64_t>(box.y), static_cast<int64_t>(box.z)};
   }
 
   std::vector<glm::dvec3> places_;
-  double reach_ = 0;
-  std::map<Box, uint32_t> known_;
+  double reach_ = 0;               // how far apart rounding may put points that are one
+  std::map<Box, uint32_t> known_;  // kNoPoint: several
 };
 
 /// A part of a cell.
@@ -158,7 +172,7 @@ const std::vector<PartShares>& sharesOf(CellKind shape) {
 struct HalvedPiece {
   std::vector<Middle> middles;      // sorted
   std::vector<uint32_t> points;     // [middle]: a new point, or one of the file's where a node hangs
-  std::vector<size_t> added;        // [new point]: its middle
+  std::vector<size_t> added;        // [new point]: its number among the middles
   std::vector<uint64_t> begins{0};  // [cell + 1], in the parts
 };
 
@@ -200,11 +214,13 @@ class HalvedMesh final : public ForwardingMesh {
   void readMiddles(uint32_t piece, std::span<const Middle> middles, std::span<const uint32_t> scalars,
                    MeshPoints& out) const;
 
+  bool findNodes(uint32_t piece, const MeshCells& whole, size_t n, std::vector<uint64_t>& nodes) const;
+
   bool hasValue(float value) const { return std::isfinite(value) && value != blank_value_; }
   std::shared_ptr<const PointMeans> meansOf(uint32_t piece, uint32_t scalar) const;
   PointMeans computedMeans(uint32_t piece, uint32_t scalar) const;
   void appendValues(const MeshCells& whole, size_t n, float value, const PointMeans& means,
-                    std::pair<uint64_t, uint64_t> parts, std::vector<float>& out) const;
+                    std::pair<uint64_t, uint64_t> wanted, std::vector<float>& out) const;
 
   std::vector<HalvedPiece> pieces_;
   std::optional<float> blank_value_;
@@ -215,19 +231,19 @@ class HalvedMesh final : public ForwardingMesh {
 
 HalvedPiece HalvedMesh::measured(uint32_t piece) const {
   const MeshPiece& whole = source().description().pieces[piece];
-  if (whole.points > kMaxPoints)
+  if (whole.points > kMaxHalvedPoints)
     throw Error("{}: has {} points; unstructured grids of up to {} points can be refined", whole.file,
-                whole.points, kMaxPoints);
+                whole.points, kMaxHalvedPoints);
   HalvedPiece found;
   std::vector<Middle>& middles = found.middles;
   size_t united = 0;
   MeshCells cells;
-  for (uint64_t first = 0; first < whole.cells; first += kCellsRead) {
-    const uint64_t count = std::min(kCellsRead, whole.cells - first);
+  for (uint64_t first = 0; first < whole.cells; first += kCellsReadAtOnce) {
+    const uint64_t count = std::min(kCellsReadAtOnce, whole.cells - first);
     source().readCells(piece, first, count, {}, cells);
     checkCells(cells, whole, first);
     for (size_t n = 0; n < count; ++n) {
-      const bool is_halved = isHalved(cells, n);
+      const bool is_halved = canBeHalved(cells, n);
       found.begins.push_back(found.begins.back() +
                              (is_halved ? partsOf(cells.shapes[n], kHalved).size() : 1));
       if (!is_halved) continue;
@@ -235,7 +251,7 @@ HalvedPiece HalvedMesh::measured(uint32_t piece) const {
         if (const Middle middle = middleOf(between, cells.cornersOfCell(n)); !isCorner(middle))
           middles.push_back(middle);
     }
-    if (middles.size() < united + kMiddlesAtOnce) continue;
+    if (middles.size() < united + kMiddlesUnitedAtOnce) continue;
     sortAndUnite(middles);
     united = middles.size();
   }
@@ -257,8 +273,9 @@ void HalvedMesh::findPoints(uint32_t piece, HalvedPiece& of) const {
     for (size_t n = 0; n < count; ++n) {
       const glm::dvec3 place(points.x[n], points.y[n], points.z[n]);
       const uint32_t there = known.at(place, of.middles[first + n][0]);
-      if (there == kNone) of.added.push_back(first + n);
-      of.points.push_back(there == kNone ? next++ : there);
+      const bool is_new = there == PointsByPlace::kNoPoint;
+      if (is_new) of.added.push_back(first + n);
+      of.points.push_back(is_new ? next++ : there);
     }
   }
 }
@@ -278,12 +295,12 @@ void HalvedMesh::readPoints(uint32_t piece, uint64_t first, uint64_t count, std:
 /// Appends the points of these middles.
 void HalvedMesh::readMiddles(uint32_t piece, std::span<const Middle> middles,
                              std::span<const uint32_t> scalars, MeshPoints& out) const {
-  MeshCells around;  // their corners, as those of cells
+  MeshCells around;  // [middle]: its corners, as a curved cell whose nodes CellNodes reads
   std::vector<uint64_t> corners;
   for (const Middle& middle : middles) {
     corners.clear();
     for (const uint32_t corner : middle)
-      if (corner != kNone) corners.push_back(corner);
+      if (corner != kNoCorner) corners.push_back(corner);
     around.appendCurved(CellKind::kPolyhedron, kHalved, corners);
   }
   const CellNodes known(source(), piece, around, scalars, {});
@@ -317,13 +334,28 @@ void HalvedMesh::readMiddles(uint32_t piece, std::span<const Middle> middles,
   }
 }
 
+/// Finds the corners and middles of cell n, in the order of a curved cell's nodes. False: the cell has other middles than before.
+bool HalvedMesh::findNodes(uint32_t piece, const MeshCells& whole, size_t n,
+                           std::vector<uint64_t>& nodes) const {
+  const auto& [middles, points, added, begins] = pieces_[piece];
+  const std::span<const uint64_t> corners = whole.cornersOfCell(n);
+  nodes.assign(corners.begin(), corners.end());
+  for (const auto& between : middlesOf(whole.shapes[n])) {
+    const Middle middle = middleOf(between, corners);
+    const auto found = std::lower_bound(middles.begin(), middles.end(), middle);
+    const bool is_known = found != middles.end() && *found == middle;
+    if (!is_known && !isCorner(middle)) return false;
+    nodes.push_back(is_known ? points[static_cast<size_t>(found - middles.begin())] : middle[0]);
+  }
+  return true;
+}
+
 void HalvedMesh::readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                            MeshCells& out) const {
   out.clear();
   out.scalars.resize(scalars.size());
   for (std::vector<float>& values : out.scalars) values.clear();
   if (count == 0) return;
-  const std::vector<Middle>& middles = pieces_[piece].middles;
   const std::vector<uint64_t>& begins = pieces_[piece].begins;
   const auto cellOf = [&](uint64_t part) {
     return static_cast<uint64_t>(std::upper_bound(begins.begin(), begins.end(), part) - begins.begin()) - 1;
@@ -336,23 +368,9 @@ void HalvedMesh::readCells(uint32_t piece, uint64_t first, uint64_t count, std::
   for (const uint32_t scalar : scalars) means.push_back(meansOf(piece, scalar));
   std::vector<uint64_t> nodes;
   for (size_t n = 0; n < whole.size(); ++n) {
-    const bool is_halved = isHalved(whole, n);
-    const CellParts* const parts = is_halved ? &partsOf(whole.shapes[n], kHalved) : nullptr;
+    const CellParts* const parts = canBeHalved(whole, n) ? &partsOf(whole.shapes[n], kHalved) : nullptr;
     const uint64_t begin = begins[cell + n], next = begins[cell + n + 1];
-    bool is_as_before = (parts ? parts->size() : 1) == next - begin;
-    if (is_halved) {
-      const auto corners = whole.cornersOfCell(n);
-      nodes.assign(corners.begin(), corners.end());
-      for (const auto& between : middlesOf(whole.shapes[n])) {
-        const Middle middle = middleOf(between, corners);
-        const auto found = std::lower_bound(middles.begin(), middles.end(), middle);
-        const bool is_known = found != middles.end() && *found == middle;
-        is_as_before &= is_known || isCorner(middle);
-        nodes.push_back(is_known ? pieces_[piece].points[static_cast<size_t>(found - middles.begin())]
-                                 : middle[0]);
-      }
-    }
-    if (!is_as_before)
+    if ((parts ? parts->size() : 1) != next - begin || (parts && !findNodes(piece, whole, n, nodes)))
       throw Error("{}: cell {} is another one than before; the file has been replaced",
                   description_.pieces[piece].file, cell + n);
     const std::pair wanted(std::max(first, begin) - begin, std::min(first + count, next) - begin);
@@ -381,8 +399,8 @@ PointMeans HalvedMesh::computedMeans(uint32_t piece, uint32_t scalar) const {
   std::vector<double> sums(whole.points, 0.0);
   std::vector<uint32_t> counts(whole.points, 0);
   MeshCells cells;
-  for (uint64_t first = 0; first < whole.cells; first += kCellsRead) {
-    const uint64_t count = std::min(kCellsRead, whole.cells - first);
+  for (uint64_t first = 0; first < whole.cells; first += kCellsReadAtOnce) {
+    const uint64_t count = std::min(kCellsReadAtOnce, whole.cells - first);
     source().readCells(piece, first, count, std::span(&scalar, 1), cells);
     checkCells(cells, whole, first);
     for (size_t n = 0; n < count; ++n) {
@@ -400,11 +418,11 @@ PointMeans HalvedMesh::computedMeans(uint32_t piece, uint32_t scalar) const {
   return means;
 }
 
-/// Appends the values of the parts [first, second) of cell n.
+/// Appends the values of the parts [wanted.first, wanted.second) of cell n.
 void HalvedMesh::appendValues(const MeshCells& whole, size_t n, float value, const PointMeans& means,
-                              std::pair<uint64_t, uint64_t> parts, std::vector<float>& out) const {
-  if (!isHalved(whole, n) || whole.hidden[n] != 0 || !hasValue(value)) {
-    out.insert(out.end(), parts.second - parts.first, value);
+                              std::pair<uint64_t, uint64_t> wanted, std::vector<float>& out) const {
+  if (!canBeHalved(whole, n) || whole.hidden[n] != 0 || !hasValue(value)) {
+    out.insert(out.end(), wanted.second - wanted.first, value);
     return;
   }
   const std::span<const uint64_t> corners = whole.cornersOfCell(n);
@@ -424,12 +442,12 @@ void HalvedMesh::appendValues(const MeshCells& whole, size_t n, float value, con
     volume += part.volume;
   }
   mean /= volume;
-  double slope = 1;
+  double slope = 1;  // less where a part would have a value beyond those around
   for (const double of_part : of_parts) {
     if (value + (of_part - mean) > most) slope = std::min(slope, (most - value) / (of_part - mean));
     if (value + (of_part - mean) < least) slope = std::min(slope, (least - value) / (of_part - mean));
   }
-  for (uint64_t part = parts.first; part < parts.second; ++part)
+  for (uint64_t part = wanted.first; part < wanted.second; ++part)
     out.push_back(static_cast<float>(value + slope * (of_parts[part] - mean)));
 }
 
@@ -445,7 +463,8 @@ void addPiece(const MeshSource& source, uint32_t piece, Unevenness& to) {
   source.readCells(piece, 0, whole.cells, {}, cells);
   checkCells(cells, whole, 0);
   for (size_t n = 0; n < cells.size(); ++n)
-    if (isHalved(cells, n)) cells.curved.emplace_back(n, kHalved);  // so that their corners are read
+    if (canBeHalved(cells, n))
+      cells.curved.emplace_back(n, kHalved);  // CellNodes reads those of curved cells
   const CellNodes nodes(source, piece, cells, {}, {});
   std::map<uint64_t, std::pair<double, size_t>> at_points;
   std::vector<double> volumes(cells.size(), 0.0);
@@ -483,7 +502,7 @@ bool isHalvedByNeed(const MeshSource& source) {
   constexpr double kUneven = 0.07;
   const std::vector<MeshPiece>& pieces = source.description().pieces;
   if (cellsOf(source.description()) > kMaxCells ||
-      std::ranges::any_of(pieces, [](const MeshPiece& piece) { return piece.points > kMaxPoints; }))
+      std::ranges::any_of(pieces, [](const MeshPiece& piece) { return piece.points > kMaxHalvedPoints; }))
     return false;
   Unevenness of_all;
   for (uint32_t piece = 0; piece < pieces.size(); ++piece) addPiece(source, piece, of_all);

@@ -17,16 +17,17 @@
 
 namespace curvisplat {
 
-/// The most cells that are halved: the corners of all new points are in memory, about 300 bytes for each cell.
-inline constexpr uint64_t kMaxHalved = 100'000;
+/// The most cells that are halved, and the most points of a piece: the corners of all new points are in memory, about 300 bytes for
+/// each cell, and more while they are found.
+inline constexpr uint64_t kMaxHalved = 100'000, kMaxHalvedPoints = 10 * kMaxHalved;
 
-/// Reads all cells and points once, and each cell's scalar once before its first use. Samples with `blank_value` have no value. Any
-/// number of threads may read the result. Throws Error if there are more than kMaxHalved cells, or as reading does.
+/// Reads all cells once and the points twice, and each cell's scalar once before its first use. Samples with `blank_value` have no
+/// value. Any number of threads may read the result. Throws Error if there are more cells or points, or as reading does.
 std::unique_ptr<MeshSource> halved(std::unique_ptr<MeshSource> source,
                                    std::optional<double> blank_value = std::nullopt);
 
-/// Whether a picture will show the mesh's cells, so that halving them helps, and costs little: there are up to 30,000, and at the
-/// corners of a cell the mean volumes of those around differ by 7 % and more (root mean square, by volume). A uniform medium then
+/// Whether a picture will show the mesh's cells, so that halving them helps, and costs little: it has up to 30,000 cells, and
+/// at the corners of a cell the mean volumes of those around differ by 7 % and more (root mean square, by volume). A uniform medium then
 /// deviates by 1.3 to 3 % (rms), and by 0.5 to 2 % once they are halved. Reads all cells of such a small mesh.
 bool isHalvedByNeed(const MeshSource& source);
 

@@ -283,7 +283,8 @@ void drawMarkers(cairo_t* cairo, const AnnotatedScene& scene) {
     if (marker.text.empty()) continue;
     cairo_text_extents_t text;
     cairo_text_extents(cairo, marker.text.c_str(), &text);
-    const double height = line.ascent + line.descent, width = text.x_advance + 2 * margin, away = 1.5 * radius;
+    const double height = line.ascent + line.descent, width = text.x_advance + 2 * margin,
+                 away = 1.5 * radius;
     const bool at_left = at.x + away + width > view.size.width && at.x - away - width >= 0;
     const double left = at_left ? at.x - away - width : at.x + away, top = at.y - 0.5 * height;
     setInk(cairo, kDark, 0.67);

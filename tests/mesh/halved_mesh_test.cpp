@@ -7,11 +7,13 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <glm/vector_relational.hpp>
 #include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
+#include <random>
 #include <set>
 #include <utility>
 #include <vector>
@@ -128,6 +130,19 @@ TEST(HalvedMesh, NodesThatHangAreTheMiddlesOfLargerCells) {
   for (size_t n = 0; n < parts.points.x.size(); ++n)
     places.insert({parts.points.x[n], parts.points.y[n], parts.points.z[n]});
   EXPECT_EQ(places.size(), parts.points.x.size());
+}
+
+TEST(HalvedMesh, NodesThatHangAreFoundWhereverSinglePrecisionRoundsThem) {
+  const size_t points = Whole(*halvedOf({partedCube(2)})).points.x.size();
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> part(-1, 1);
+  for (int n = 0; n < 200; ++n) {
+    const glm::dvec3 to(3 * part(random), 3 * part(random), 3 * part(random));
+    const double size = std::exp(part(random));
+    ArrayPiece cube = partedCube(2);
+    for (glm::dvec3& point : cube.points) point = glm::dvec3(glm::vec3(to + size * point));
+    EXPECT_EQ(Whole(*halvedOf({cube})).points.x.size(), points) << to.x << ' ' << size;
+  }
 }
 
 TEST(HalvedMesh, CornersOfThinLayersFarFromTheOriginAreNoMiddles) {
