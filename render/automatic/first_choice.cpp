@@ -172,7 +172,7 @@ FunctionParts FirstChoice::inHaze(double depth, FunctionParts parts) const {
 BinWeights FirstChoice::seenIn(const VolumeHistogram& histogram, const TransferFunction& function) const {
   const SeenValues seen = seenValues(samples_, depthsOf(samples_, function), lower_, upper_);
   BinWeights weights{};
-  for (size_t n = 0; n < seen.values.size(); ++n) weights[histogram.binOf(seen.values[n])] += seen.lights[n];
+  for (size_t n = 0; n < seen.values.size(); ++n) weights[histogram.binOf(seen.values[n])] += seen.areas[n];
   return weights;
 }
 

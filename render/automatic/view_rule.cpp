@@ -54,7 +54,8 @@ class WeightedBins {
  private:
   size_t binOf(double number) const {
     const double place = (number - low_) / (high_ - low_) * static_cast<double>(sums_.size());
-    return place < static_cast<double>(sums_.size()) ? static_cast<size_t>(place) : sums_.size() - 1;
+    return place < static_cast<double>(sums_.size()) ? static_cast<size_t>(place)
+                                                     : sums_.size() - 1;  // of one number, 0 / 0, the last
   }
 
   std::span<const double> numbers_, weights_;
@@ -76,8 +77,9 @@ struct Bounds {
 /// Coarse samples as seen from one side, sorted into square pixels: what areas are measured with. Borrows the samples.
 class PixelSums {
  public:
-  /// Pixels along the longer side, and about how many samples a pixel has: fewer samples are seen with larger pixels, without gaps.
-  static constexpr int kMaxPixels = 80, kSamplesPerPixel = 47;
+  static constexpr int kMaxPixels = 80;  // along the longer side
+  static constexpr int kSamplesPerPixel =
+      47;  // about: fewer samples are seen with larger pixels, without gaps
 
   /// `view`: as Camera::named() knows it. `bounds`: of the samples, of which there are some.
   PixelSums(const CoarseSamples& samples, const Bounds& bounds, std::string_view view)
@@ -136,6 +138,7 @@ class PixelSums {
   double width_ = 0;
 };
 
+// Another view than iso, or than the one found so far, has to be larger by this factor.
 constexpr double kPreferIso = 1.3, kPreferEarlier = 1.03;
 // The views that are compared. A silhouette is as large from the other side.
 constexpr std::string_view kViews[] = {"iso", "+x", "+y", "+z"};
@@ -168,10 +171,13 @@ double seenArea(const CoarseSamples& samples, std::string_view view, const std::
 namespace {
 
 constexpr double kUnseenPart = 0.01;  // of the extinction, beyond either side of the zoomed box
-constexpr double kZoomMargin = 1.25, kWholeMargin = 1.15, kWorthZooming = 0.9, kMinZoomed = 0.25;
+constexpr double kZoomMargin = 1.25,
+                 kWholeMargin = 1.15;   // heights of a picture over those of what it frames
+constexpr double kWorthZooming = 0.9;   // of the whole data's picture: less is framed
+constexpr double kMinZoomed = 0.25;     // of the same: no less is framed
 constexpr double kWorthCropping = 0.5;  // what can be seen has less than this part of the whole data's height
 constexpr int kPlaceDigits = 4;
-// A view from below has to show much more, and another side than iso a little more.
+// A view from below has to show much more, and another side than the first a little more.
 constexpr double kPreferAbove = 1.5, kPreferFirst = 1.05;
 constexpr glm::dvec3 kOctants[] = {{1, 1, 1},  {-1, 1, 1},  {-1, -1, 1},  {1, -1, 1},
                                    {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}};
@@ -179,11 +185,10 @@ constexpr glm::dvec3 kOctants[] = {{1, 1, 1},  {-1, 1, 1},  {-1, -1, 1},  {1, -1
 /// Samples as a camera sees them: x right, y up, z towards the viewer.
 struct SeenSamples {
   std::array<std::vector<double>, 3> places;
-  const glm::dmat4 world_from_view;
+  const glm::dmat4 view_from_world, world_from_view;
 
   SeenSamples(const CoarseSamples& samples, const Camera& camera)
-      : world_from_view(glm::inverse(camera.viewFromWorld())) {
-    const glm::dmat4 view_from_world = camera.viewFromWorld();
+      : view_from_world(camera.viewFromWorld()), world_from_view(glm::inverse(view_from_world)) {
     for (std::vector<double>& along : places) along.resize(samples.size());
     for (size_t n = 0; n < samples.size(); ++n) {
       const glm::dvec4 place = view_from_world * glm::dvec4(samples.positions[n], 1);
@@ -240,9 +245,9 @@ namespace {
 /// Some of the samples, standing for all: enough to compare sides.
 struct FewSamples {
   static constexpr size_t kSamples = 30'000;
-  CoarseSamples samples;       // positions and values alone
-  std::vector<double> depths;  // of what each stands for
-  std::vector<double> rare;    // extinction over the largest, 0..1
+  CoarseSamples samples;            // positions and values alone
+  std::vector<double> depths;       // of what each stands for
+  std::vector<double> extinctions;  // over the largest, 0..1
 
   FewSamples(const CoarseSamples& all, const std::vector<double>& all_depths) {
     const size_t stride = std::max<size_t>(1, all.size() / kSamples);
@@ -252,14 +257,15 @@ struct FewSamples {
       samples.positions.push_back(all.positions[n]);
       samples.values.push_back(all.values[n]);
       depths.push_back(all_depths[n] * static_cast<double>(stride));
-      rare.push_back(all_depths[n] / all.volumes[n]);
-      largest = std::max(largest, rare.back());
+      extinctions.push_back(all_depths[n] / all.volumes[n]);
+      largest = std::max(largest, extinctions.back());
     }
-    for (double& one : rare) one /= largest > 0 ? largest : 1;
+    for (double& one : extinctions) one /= largest > 0 ? largest : 1;
   }
 };
 
-/// Calls take(n, light) with the light that each sample takes, from the side of a camera, of what comes through to it.
+/// Calls take(n, hidden), the samples nearest to a camera first. `hidden`: the area of the background that this sample hides, and none
+/// before it.
 template <typename Take>
 void walkSeen(const FewSamples& few, const Camera& camera, const Take& take) {
   constexpr int kPixels = 48;  // of the longer side: a dozen samples for each
@@ -273,7 +279,7 @@ void walkSeen(const FewSamples& few, const Camera& camera, const Take& take) {
   }
   const double width = std::max(reach[0], reach[1]) / kPixels;
   if (!(width > 0)) return;
-  std::vector<uint64_t> order;  // the nearest first
+  std::vector<uint64_t> order;  // the distance in the upper half, n in the lower
   for (size_t n = 0; n < few.depths.size(); ++n) {
     const double away = reach[2] > 0 ? 1 - (seen.places[2][n] - low[2]) / reach[2] : 0;
     order.push_back(static_cast<uint64_t>(away * 0xffffffff) << 32 | n);
@@ -292,11 +298,10 @@ void walkSeen(const FewSamples& few, const Camera& camera, const Take& take) {
   }
 }
 
-/// How much is seen of rare values from the side of a camera: over all pixels, the light that each sample
-/// takes, times its extinction.
+/// How much a camera sees of the rare values, which are the most opaque: the area that each sample hides, times its extinction.
 double rareSeen(const FewSamples& few, const Camera& camera) {
   double sum = 0;
-  walkSeen(few, camera, [&](size_t n, double light) { sum += light * few.rare[n]; });
+  walkSeen(few, camera, [&](size_t n, double hidden) { sum += hidden * few.extinctions[n]; });
   return sum;
 }
 
@@ -318,16 +323,18 @@ SeenValues seenValues(const CoarseSamples& samples, const std::vector<double>& d
   SeenValues seen{few.samples.values, std::vector<double>(few.samples.size(), 0)};
   for (const glm::dvec3& octant : kOctants)
     walkSeen(few, obliqueCamera(octant, lower, upper),
-             [&](size_t n, double light) { seen.lights[n] += light; });
+             [&](size_t n, double hidden) { seen.areas[n] += hidden; });
   return seen;
 }
 
 namespace {
 
-/// Finds a camera, in the view space of `seen`, that shows the points in perspective as large as it can.
+/// Finds a camera that looks along -z and shows the points in perspective as large as it can. An edge of the picture is a plane through
+/// the camera; moved in parallel until it touches the points from outside, it meets z = 0 at the largest of x + slope z at the right, of
+/// slope z - x at the left. The camera is where the planes meet of two edges that face each other, or farther away.
 class PerspectiveFit {
  public:
-  /// `margin`: of the picture's size.
+  /// `margin`: the picture's size over that of the points.
   PerspectiveFit(double aspect, double margin)
       : slopes_{std::tan(kChosenViewAngle * std::numbers::pi / 360) / margin * aspect,
                 std::tan(kChosenViewAngle * std::numbers::pi / 360) / margin} {}
@@ -366,10 +373,10 @@ std::string betterSide(const DrawnSamples& drawn, const std::string& view) {
   return worth(other) > (other == "-z" ? kPreferAbove : kPreferFirst) * worth(view) ? other : view;
 }
 
-ViewChoice alongAxis(const CoarseSamples& samples, const std::vector<double>& depths, ViewChoice choice,
-                     const Camera& whole, double aspect) {
-  const SeenSamples seen(samples, whole);
-  const SeenBoxes boxes(seen, depths);
+/// The view along an axis, `whole`'s, nearer where that shows much more of what can be seen, or else as it is.
+ViewChoice alongAxis(const DrawnSamples& drawn, ViewChoice choice, const Camera& whole, double aspect) {
+  const SeenSamples seen(drawn.samples, whole);
+  const SeenBoxes boxes(seen, drawn.depths);
   const bool cropped = boxes.isCropped(aspect);
   const SeenBox& box = cropped ? boxes.seen : boxes.all;
   const double needed = (cropped ? kZoomMargin : kWholeMargin) * box.halfHeight(aspect);
@@ -402,52 +409,65 @@ Camera cameraOf(const ViewChoice& choice, const glm::dvec3& lower, const glm::dv
   return camera;
 }
 
-ViewChoice chooseView(const DrawnSamples& drawn, ImageSize size, Framed framed) {
-  const auto& [samples, depths, widest, lower, upper] = drawn;
-  ViewChoice choice{std::string(widest.view)};
-  const double aspect = static_cast<double>(size.width) / size.height;
-  const double total = std::accumulate(depths.begin(), depths.end(), 0.0);
-  if (!(total > 0)) return choice;
-  if (widest.view != "iso") {
-    choice.view = betterSide(drawn, choice.view);
-    if (framed == Framed::kBox) return choice;
-    const Camera whole = Camera::named(choice.view, lower, upper, size, Projection::kOrthographic);
-    return alongAxis(samples, depths, choice, whole, aspect);
-  }
-  const FewSamples few(samples, depths);
+namespace {
+
+/// From where a camera sees most of the rare values, of the eight oblique sides.
+glm::dvec3 bestOctant(const DrawnSamples& drawn) {
+  const FewSamples few(drawn.samples, drawn.depths);
   double best = 0;
   glm::dvec3 from = kOctants[0];
   for (const glm::dvec3& octant : kOctants) {
     const double worth =
-        rareSeen(few, obliqueCamera(octant, lower, upper)) / (octant.z < 0 ? kPreferAbove : 1);
+        rareSeen(few, obliqueCamera(octant, drawn.lower, drawn.upper)) / (octant.z < 0 ? kPreferAbove : 1);
     if (!(worth > best * (best > 0 ? kPreferFirst : 1))) continue;
     best = worth;
     from = octant;
   }
-  const SeenSamples seen(samples, obliqueCamera(from, lower, upper));
-  const SeenBoxes boxes(seen, depths);
+  return from;
+}
+
+/// The view in perspective that looks along `camera`, as near as it can show what is framed.
+ViewChoice inPerspective(const DrawnSamples& drawn, const Camera& camera, double aspect, Framed framed) {
+  const glm::dvec3 &lower = drawn.lower, &upper = drawn.upper;
+  const SeenSamples seen(drawn.samples, camera);
+  const SeenBoxes boxes(seen, drawn.depths);
   const bool cropped = framed == Framed::kSeen && boxes.isCropped(aspect);
   PerspectiveFit fit(aspect, cropped ? kZoomMargin : kWholeMargin);
-  const glm::dmat4 view_from_world = glm::inverse(seen.world_from_view);
   if (framed == Framed::kBox)
     for (int n = 0; n < 8; ++n) {
       const glm::dvec3 corner(n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y,
                               n & 4 ? upper.z : lower.z);
-      fit.add(glm::dvec3(view_from_world * glm::dvec4(corner, 1)));
+      fit.add(glm::dvec3(seen.view_from_world * glm::dvec4(corner, 1)));
     }
   else
-    for (size_t n = 0; n < samples.size(); ++n) {
+    for (size_t n = 0; n < drawn.samples.size(); ++n) {
       const glm::dvec3 place(seen.places[0][n], seen.places[1][n], seen.places[2][n]);
-      if (cropped && !(depths[n] > 0 && boxes.seen.contains(place))) continue;
+      if (cropped && !(drawn.depths[n] > 0 && boxes.seen.contains(place))) continue;
       fit.add(place);
     }
   const double extent = glm::length(boxes.all.upper - boxes.all.lower);
   const glm::dvec3 position = fit.position(0.05 * extent);
   const glm::dvec3 focal(position.x, position.y, (cropped ? boxes.seen : boxes.all).middle().z);
   const double distance = position.z - focal.z;
+  ViewChoice choice;
   choice.position = roundedPlace(seen.world(position), distance);
   choice.focal_point = roundedPlace(seen.world(focal), distance);
   return choice;
+}
+
+}  // namespace
+
+ViewChoice chooseView(const DrawnSamples& drawn, ImageSize size, Framed framed) {
+  ViewChoice choice{std::string(drawn.widest.view)};
+  const double aspect = static_cast<double>(size.width) / size.height;
+  const double total = std::accumulate(drawn.depths.begin(), drawn.depths.end(), 0.0);
+  if (!(total > 0)) return choice;
+  if (choice.view == "iso")
+    return inPerspective(drawn, obliqueCamera(bestOctant(drawn), drawn.lower, drawn.upper), aspect, framed);
+  choice.view = betterSide(drawn, choice.view);
+  if (framed == Framed::kBox) return choice;
+  const Camera whole = Camera::named(choice.view, drawn.lower, drawn.upper, size, Projection::kOrthographic);
+  return alongAxis(drawn, choice, whole, aspect);
 }
 
 }  // namespace curvisplat

@@ -30,14 +30,15 @@ Silhouette widestSilhouette(const CoarseSamples& samples);
 double seenArea(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths);
 
 /// Whether a square picture from `view` shows only the small part of the data in which there is something to be seen (chooseView()).
+/// There are samples.
 bool showsAPart(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths);
 
-/// Values of some of the samples, and how much is seen of each from the eight oblique sides together; the unit does not matter.
+/// Values of some of the samples, and the area that each hides from the eight oblique sides together; the unit does not matter.
 struct SeenValues {
   std::vector<float> values;
-  std::vector<double> lights;
+  std::vector<double> areas;
 };
-/// `depths` [sample]: volume times extinction, 1/area. `lower`, `upper`: the data's box.
+/// `depths` [sample]: volume times extinction, an area. `lower`, `upper`: the data's box.
 SeenValues seenValues(const CoarseSamples& samples, const std::vector<double>& depths,
                       const glm::dvec3& lower, const glm::dvec3& upper);
 
@@ -63,7 +64,7 @@ enum class Framed {
 /// The samples that are drawn; borrows all.
 struct DrawnSamples {
   const CoarseSamples& samples;
-  const std::vector<double>& depths;  // [sample]: volume times extinction, 1/area
+  const std::vector<double>& depths;  // [sample]: volume times extinction, an area
   const Silhouette& widest;
   glm::dvec3 lower, upper;  // the data's box
 };

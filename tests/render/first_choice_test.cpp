@@ -229,8 +229,8 @@ TEST(FirstChoice, WhatIsHiddenTakesNoColours) {
     const SeenValues seen = seenValues(samples, depths, glm::dvec3(0), glm::dvec3(1));
     double sum = 0, of_value = 0;
     for (size_t n = 0; n < seen.values.size(); ++n) {
-      sum += seen.lights[n];
-      if (seen.values[n] == value) of_value += seen.lights[n];
+      sum += seen.areas[n];
+      if (seen.values[n] == value) of_value += seen.areas[n];
     }
     return of_value / sum;
   };
