@@ -23,7 +23,7 @@ done
 
 curvisplat=${CURVISPLAT:-$root/build/release/tools/curvisplat}
 if [[ -z ${CURVISPLAT:-} ]]; then
-  [[ -x $curvisplat ]] || echo "demo: building takes about twelve minutes on two cores; packages are installed first if any are missing"
+  [[ -x $curvisplat ]] || echo "demo: building takes about ten minutes on two cores; packages are installed first if any are missing"
   "$root/tools/build.sh" curvisplat
 fi
 out=${OUT:-$root/out}

@@ -36,7 +36,7 @@ export TSAN_OPTIONS=suppressions=$root/tests/tsan.supp:halt_on_error=1
 
 case $form in
   plain)
-    echo "test: building takes about 15 minutes from nothing on two cores, all tests some 18"
+    echo "test: building takes about 12 minutes from nothing on two cores, all tests 12 to 20"
     "$root/tools/setup.sh"
     # While the program is built: the smoke test of bench/ also draws with VTK; tests/end_to_end/fuse_test.py needs fusepy; tests/serve a
     # browser and websocket; movies ffmpeg; tests/stream/read_cache.py, tests/python and the tests of files that others write need the others.

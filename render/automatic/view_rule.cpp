@@ -411,7 +411,7 @@ Camera cameraOf(const ViewChoice& choice, const glm::dvec3& lower, const glm::dv
 
 namespace {
 
-/// From where a camera sees most of the rare values, of the eight oblique sides.
+/// The oblique side from which a camera sees most of the rare values.
 glm::dvec3 bestOctant(const DrawnSamples& drawn) {
   const FewSamples few(drawn.samples, drawn.depths);
   double best = 0;

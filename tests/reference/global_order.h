@@ -1,5 +1,5 @@
 // The specification of a frame's drawing order: all splats of its cut in memory, sorted for each order tile by
-// itself, and each tile drawn as a picture of its own.
+// itself, and each tile drawn as a picture of its own. Keys are the program's (keyAt): DepthKeysTest compares these with a formula.
 #pragma once
 
 #include <vector>

@@ -12,7 +12,6 @@
 #include <exception>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string>
 #include <system_error>
@@ -28,6 +27,7 @@
 #include "preprocess/survey/cell_bends.h"
 #include "stream/base/error.h"
 #include "stream/base/memory.h"
+#include "stream/base/mutex.h"
 #include "stream/base/name_list.h"
 #include "stream/base/progress.h"
 #include "stream/cache/faces_file.h"
@@ -191,14 +191,14 @@ class RefinementOnce {
  public:
   template <typename Find>
   const Refinement& get(const Find& find) {
-    const std::scoped_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!found_) found_ = find();
     return *found_;
   }
 
  private:
-  std::mutex mutex_;
-  std::optional<Refinement> found_;  // guarded by mutex_
+  Mutex mutex_;
+  std::optional<Refinement> found_ GUARDED_BY(mutex_);
 };
 
 /// Does what chooseScalars() does, but calls say(note) instead of printing, and throws UsageError.
