@@ -132,6 +132,17 @@ TEST(HalvedMesh, NodesThatHangAreTheMiddlesOfLargerCells) {
   EXPECT_EQ(places.size(), parts.points.x.size());
 }
 
+/// Hexahedra of 20 nodes that a file calls hexahedra of 8: nothing has been computed at the others.
+TEST(HalvedMesh, PointsOfNoCellAreNoMiddles) {
+  ArrayPiece cube = evenCube(2);
+  const size_t corners = cube.points.size();
+  cube.points.emplace_back(0.5, 0.0, 0.0);
+  cube.point_values.push_back(NAN);
+  const Whole parts(*halvedOf({cube}));
+  EXPECT_EQ(parts.points.x.size(), corners + 1 + 98);  // 5^3 nodes of the halves, without 3^3
+  for (const uint64_t corner : parts.cells.cornersOfCell(0)) EXPECT_NE(corner, corners);
+}
+
 TEST(HalvedMesh, NodesThatHangAreFoundWhereverSinglePrecisionRoundsThem) {
   const size_t points = Whole(*halvedOf({partedCube(2)})).points.x.size();
   std::mt19937 random(5);
