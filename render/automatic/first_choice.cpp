@@ -15,6 +15,7 @@
 
 #include "render/automatic/coarse_samples.h"
 #include "render/automatic/opacity_rule.h"
+#include "render/automatic/view_rule.h"
 #include "render/colour/function_parts.h"
 #include "stream/base/component_name.h"
 
@@ -26,7 +27,8 @@ constexpr double kMeanDepth = 1.05;  // over what is seen: an absorption of 65 %
 // The mean depth that values have at least which would be clear: of materials, and of what surrounds that which is seen in less than
 // kContext of the silhouette.
 constexpr double kMaterialsDepth = 0.6, kTwoMaterialsDepth = 0.3, kContextDepth = 0.15, kContext = 0.6;
-constexpr double kDivergingShare = 0.25;
+constexpr double kDivergingShare = 0.25;   // of the lesser sign, in the interval: of the other's length
+constexpr double kDivergingVolume = 0.02;  // of the lesser sign, in the volume
 constexpr int kRangeDigits = 3, kUnitDigits = 3;
 
 bool isDiverging(const std::string& map) {
@@ -100,60 +102,98 @@ FunctionParts FirstChoice::constantFunction() const {
   return parts;
 }
 
-FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& maps, bool with_sheets) const {
-  const auto with_map = [&](FunctionParts chosen, const char* preferred) {
-    chosen.map = map.empty() ? preferred : map;
-    return chosen;
-  };
-  if (!distribution_ || isNearlyConstant(variable_)) return with_map(constantFunction(), maps.sequential);
-  const auto histogram = volumeHistogram(samples_, *distribution_);
-  if (!histogram) return with_map(constantFunction(), maps.sequential);
+/// Functions that suit a histogram of the data. Borrows all.
+class FirstChoice::Fit {
+ public:
+  Fit(const FirstChoice& data, const VolumeHistogram& histogram, const std::string& map,
+      const DefaultMaps& maps)
+      : data_(data), histogram_(histogram), extinctions_(extinctionsOf(histogram)), map_(map), maps_(maps) {}
 
-  const BinExtinctions extinctions = extinctionsOf(*histogram);
-  const double zero = histogram->coordinate(0);
-  const auto diverges = [&](double begin, double end) {
-    const double below = zero - begin, above = end - zero;
-    return (map.empty() || isDiverging(map)) && below > 0 && above > 0 &&
-           std::min(below, above) > kDivergingShare * std::max(below, above);
+  /// A function of the interval [begin, end] of the histogram's axis. nullopt: its ends are one number in a few digits.
+  std::optional<FunctionParts> over(double begin, double end) const;
+  /// A function of the interval outside of which little is seen.
+  std::optional<FunctionParts> overSeen() const {
+    const auto [begin, end] = seenInterval(histogram_, extinctions_);
+    return over(begin, end);
+  }
+  /// A function of the part of the interval that is seen with this one, if that is much smaller.
+  std::optional<FunctionParts> narrowed(const FunctionParts& parts) const;
+  bool diverges(const FunctionParts& parts) const { return diverges(beginOf(parts), endOf(parts)); }
+
+ private:
+  /// Whether the interval has much of both signs. Where no map is named, so has the volume: a few values beyond zero do not make a field
+  /// of two signs.
+  bool diverges(double begin, double end) const;
+  double beginOf(const FunctionParts& parts) const { return histogram_.coordinate(parts.range.first); }
+  double endOf(const FunctionParts& parts) const { return histogram_.coordinate(parts.range.second); }
+
+  const FirstChoice& data_;
+  const VolumeHistogram& histogram_;
+  const BinExtinctions extinctions_;
+  const std::string& map_;
+  const DefaultMaps& maps_;
+};
+
+bool FirstChoice::Fit::diverges(double begin, double end) const {
+  const double zero = histogram_.coordinate(0), below = zero - begin, above = end - zero;
+  if (!(below > 0 && above > 0 && std::min(below, above) > kDivergingShare * std::max(below, above)))
+    return false;
+  if (!map_.empty()) return isDiverging(map_);
+  double negative = 0;
+  for (size_t bin = 0; bin < VolumeHistogram::kBins; ++bin)
+    if (histogram_.middle(bin) < zero) negative += histogram_.shares[bin];
+  return std::min(negative, 1 - negative) > kDivergingVolume;
+}
+
+std::optional<FunctionParts> FirstChoice::Fit::over(double begin, double end) const {
+  const bool diverging = diverges(begin, end);
+  const double low = histogram_.scalar(begin), high = histogram_.scalar(end);
+  if (diverging) {
+    const double zero = histogram_.coordinate(0), reach = std::max(zero - begin, end - zero);
+    begin = zero - reach;
+    end = zero + reach;
+  }
+  const auto rounded = [&](double coordinate) {
+    const double scalar = histogram_.scalar(coordinate);
+    const auto& asinh = histogram_.asinh;
+    const double from = asinh ? std::abs(scalar - asinh->centre) + asinh->width : high - low;
+    return roundedTo(scalar, from, kRangeDigits);
   };
-  const auto over = [&](double begin, double end) -> std::optional<FunctionParts> {
-    const bool diverging = diverges(begin, end);
-    const double low = histogram->scalar(begin), high = histogram->scalar(end);
-    if (diverging) {
-      const double reach = std::max(zero - begin, end - zero);
-      begin = zero - reach;
-      end = zero + reach;
-    }
-    const auto rounded = [&](double coordinate) {
-      const double scalar = histogram->scalar(coordinate);
-      const double from = histogram->asinh
-                              ? std::abs(scalar - histogram->asinh->centre) + histogram->asinh->width
-                              : high - low;
-      return roundedTo(scalar, from, kRangeDigits);
-    };
-    FunctionParts parts;
-    parts.asinh = histogram->asinh;
-    parts.range = {rounded(begin), rounded(end)};
-    if (!(parts.range.first < parts.range.second)) return std::nullopt;
-    parts.opacities = opacityPoints(*histogram, extinctions, histogram->coordinate(parts.range.first),
-                                    histogram->coordinate(parts.range.second));
-    parts = with_map(parts, diverging ? maps.diverging : maps.sequential);
-    parts.opacity_unit = opacityUnitOf(parts.function());
+  FunctionParts parts;
+  parts.asinh = histogram_.asinh;
+  parts.range = {rounded(begin), rounded(end)};
+  if (!(parts.range.first < parts.range.second)) return std::nullopt;
+  parts.opacities = opacityPoints(histogram_, extinctions_, beginOf(parts), endOf(parts));
+  parts.map = !map_.empty() ? map_ : diverging ? maps_.diverging : maps_.sequential;
+  parts.opacity_unit = data_.opacityUnitOf(parts.function());
+  return parts;
+}
+
+std::optional<FunctionParts> FirstChoice::Fit::narrowed(const FunctionParts& parts) const {
+  const auto interval =
+      narrowedInterval(histogram_, data_.seenIn(histogram_, parts.function()), beginOf(parts), endOf(parts),
+                       diverges(parts) ? std::optional(histogram_.coordinate(0)) : std::nullopt);
+  return interval ? over(interval->first, interval->second) : std::nullopt;
+}
+
+FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& maps, bool with_sheets) const {
+  const auto histogram = distribution_ && !isNearlyConstant(variable_)
+                             ? volumeHistogram(samples_, *distribution_)
+                             : std::nullopt;
+  const auto constant = [&] {
+    FunctionParts parts = constantFunction();
+    parts.map = map.empty() ? maps.sequential : map;
     return parts;
   };
+  if (!histogram) return constant();
+  const Fit fit(*this, *histogram, map, maps);
   if (const size_t values = fillingValues(*histogram); values > 1)
-    if (const auto all = over(histogram->low, histogram->high))
+    if (const auto all = fit.over(histogram->low, histogram->high))
       return inHaze(values > 2 ? kMaterialsDepth : kTwoMaterialsDepth, *all);
-  const auto [begin, end] = seenInterval(*histogram, extinctions);
-  const std::optional<FunctionParts> whole = over(begin, end);
-  if (!whole) return with_map(constantFunction(), maps.sequential);
-  const auto narrower = with_sheets
-                            ? std::nullopt
-                            : narrowedInterval(*histogram, seenIn(*histogram, whole->function()),
-                                               histogram->coordinate(whole->range.first),
-                                               histogram->coordinate(whole->range.second),
-                                               diverges(begin, end) ? std::optional(zero) : std::nullopt);
-  const FunctionParts parts = narrower ? over(narrower->first, narrower->second).value_or(*whole) : *whole;
+  const std::optional<FunctionParts> whole = fit.overSeen();
+  if (!whole) return constant();
+  // Slices and faces show what the volume hides.
+  const FunctionParts parts = with_sheets ? *whole : fit.narrowed(*whole).value_or(*whole);
   return isWithoutContext(parts.function()) ? inHaze(kContextDepth, parts) : parts;
 }
 

@@ -44,6 +44,8 @@ class FirstChoice {
                   const glm::dvec3& upper) const;
 
  private:
+  class Fit;
+
   FunctionParts constantFunction() const;
   /// Whether little of the data is seen in a picture of the whole of it.
   bool isWithoutContext(const TransferFunction& function) const;
