@@ -8,6 +8,7 @@ with the arrays, and the volume that `curvisplat convert` writes with VTK's own.
 import gzip
 import itertools
 import json
+import os
 import pathlib
 import re
 import struct
@@ -629,6 +630,19 @@ class MeshFiles(MeshCase):
                     values = f.createVariable(f"vals_elem_var1eb{n}", "f8", ("time_step", f"num_el_in_blk{n}"))
                     values[0], values[1] = n + np.arange(len(c)) / 100, 0 * c[:, 0]
         return points, p, blocks
+
+    def test_the_last_step_is_drawn_before_scalars_of_the_other_centring(self):
+        import netCDF4
+        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
+        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
+        path = self.folder / "uniform.e"
+        self.write_exodus(path)
+        with netCDF4.Dataset(path, "a") as f:
+            f["vals_nod_var1"][0] = 7
+        drawn = self.run_program("render", path, "-o", self.folder / "p.png", "--size", "40x40")
+        self.assertIn("splats of pressure", drawn.stdout)
+        self.assertIn("the last, since the first is constant,", drawn.stderr)
+        self.assertEqual(drawn.stderr.count("left out: density"), 1, drawn.stderr)
 
     def test_exodus_files(self):
         for form, one_coord in (("NETCDF3_64BIT_OFFSET", False), ("NETCDF4", False), ("NETCDF3_CLASSIC", True)):

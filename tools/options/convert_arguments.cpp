@@ -211,11 +211,11 @@ std::vector<uint32_t> positionsOf(const ConvertArguments& arguments, const std::
     const bool is_one = isScalar(description, name);  // its name may have commas
     for (const std::string& part : is_one ? std::vector{name} : splitAtCommas(name))
       if (part == "all" && !isScalar(description, part))
-        stored = defaultScalars(description, arguments.unusable_scalars);
+        stored = defaultScalars(description, arguments.unusable_scalars, say);
       else
         words.push_back(part);
   }
-  if (names.empty()) stored = defaultScalars(description, arguments.unusable_scalars);
+  if (names.empty()) stored = defaultScalars(description, arguments.unusable_scalars, say);
   if (words.empty() && !stored.empty()) return stored;
   for (const std::string& note : notesOnNumbers(description, words)) say(note);
   for (const uint32_t position : scalarsNamed(description, words))

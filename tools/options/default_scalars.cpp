@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <climits>
+#include <functional>
 #include <iterator>
 #include <set>
 #include <string>
@@ -21,17 +22,17 @@ namespace {
 struct LeftOut {
   std::vector<std::string> other_centring, same_name, beyond_limit;
 
-  void printNotes(Centring centring) const {
-    const auto print = [](const std::vector<std::string>& names, const std::string& why) {
-      if (!names.empty()) printMessage("note: left out: {}{}", listed(names), why);
+  void sayNotes(Centring centring, const std::function<void(const std::string&)>& say) const {
+    const auto sayOf = [&](const std::vector<std::string>& names, const std::string& why) {
+      if (!names.empty()) say(fmt::format("left out: {}{}", listed(names), why));
     };
     const bool cells = centring == Centring::kCell;
-    print(other_centring,
+    sayOf(other_centring,
           fmt::format(", {}-centred: this cache holds the {}-centred scalars; convert the others to a second "
                       "cache with --scalar NAME,NAME",
                       cells ? "node" : "cell", cells ? "cell" : "node"));
-    print(same_name, ", a name that an earlier scalar has");
-    print(beyond_limit,
+    sayOf(same_name, ", a name that an earlier scalar has");
+    sayOf(beyond_limit,
           fmt::format(", beyond the {} that are converted unasked; choose scalars with --scalar NAME,NAME",
                       kMaxDefaultScalars));
   }
@@ -75,7 +76,8 @@ Centring defaultCentring(const GridDescription& description, const std::vector<u
 }  // namespace
 
 std::vector<uint32_t> defaultScalars(const GridDescription& description,
-                                     const std::set<std::string>& unusable) {
+                                     const std::set<std::string>& unusable,
+                                     const std::function<void(const std::string&)>& say) {
   std::vector<uint32_t> stored, positions;
   for (uint32_t n = 0; n < description.scalars.size(); ++n)
     if (!description.scalars[n].derived && !unusable.contains(description.scalars[n].name))
@@ -102,7 +104,7 @@ std::vector<uint32_t> defaultScalars(const GridDescription& description,
       left_out.beyond_limit.push_back(description.scalars[positions[n]].name);
     positions.resize(kMaxDefaultScalars);
   }
-  left_out.printNotes(centring);
+  left_out.sayNotes(centring, say);
   return positions;
 }
 

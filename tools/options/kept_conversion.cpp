@@ -253,13 +253,10 @@ std::vector<std::vector<uint32_t>> othersThan(const GridDescription& description
   return others;
 }
 
-/// Converts the scalars of `options`; if they are all constant and none is wanted, the first others that are not.
-ConvertReport convertVarying(const DataSource& source, const ConvertOptions& options,
-                             const std::vector<std::string>& wanted, Progress& progress) {
-  const ConvertReport first = convertNarrow(source, options, wanted, progress);
-  if (!std::ranges::all_of(wanted, &std::string::empty) || options.scalars.empty() ||
-      !isConstant(options.output))
-    return first;
+/// Converts, in place of the scalars of `options`, which are constant, the first others that are not; these again if all are.
+ConvertReport convertOthers(const DataSource& source, const ConvertOptions& options,
+                            const std::vector<std::string>& wanted, ConvertReport report_of_first,
+                            Progress& progress) {
   const GridDescription& description = source.description();
   const std::vector<std::vector<uint32_t>> choices = othersThan(description, options.scalars);
   for (const std::vector<uint32_t>& scalars : choices) {
@@ -273,7 +270,7 @@ ConvertReport convertVarying(const DataSource& source, const ConvertOptions& opt
                                        namesIn(description, scalars), is_one ? "its" : "their"));
     return report;
   }
-  return choices.empty() ? first : convertNarrow(source, options, wanted, progress);
+  return choices.empty() ? std::move(report_of_first) : convertNarrow(source, options, wanted, progress);
 }
 
 /// Says which of the time steps is converted, and how all of them are.
@@ -338,21 +335,26 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   arguments.output = output;
   if (hasSeveralStepFiles(arguments.grid))
     return makeSeries(arguments, output, progress, events, scalars, precision);
-  const auto convertOpen = [&](const DataSource& source, bool previews) {
-    ConvertOptions options = optionsFor(output, files.front().stem().string());
-    options.precision = precision;
-    options.scalars = scalarsOf(arguments, scalars, source.description());
-    if (previews) makePreview(source, options, false, progress, events);
-    return convertVarying(source, options, scalars, progress);
-  };
+  ConvertOptions options = optionsFor(output, files.front().stem().string());
+  options.precision = precision;
   std::unique_ptr<DataSource> source = openSource(arguments, output);
-  ConvertReport report = convertOpen(*source, true);
+  options.scalars = scalarsOf(arguments, scalars, source->description());
+  makePreview(*source, options, false, progress, events);
+  ConvertReport report = convertNarrow(*source, options, scalars, progress);
   // Cases that begin with a uniform medium.
   if (const size_t steps = source->description().times.size(); steps > 1 && isConstant(output)) {
     arguments.grid.time_step = static_cast<uint32_t>(steps - 1);
+    const GridDescription first = source->description();
     source = openSource(arguments, output);
-    report = convertOpen(*source, false);
+    // Scalars are chosen again, which prints notes, only where the step has others.
+    if (!std::ranges::equal(first.scalars, source->description().scalars, {}, &GridScalar::name,
+                            &GridScalar::name))
+      options.scalars = scalarsOf(arguments, scalars, source->description());
+    report = convertNarrow(*source, options, scalars, progress);
   }
+  const bool none_is_wanted = std::ranges::all_of(scalars, &std::string::empty);
+  if (none_is_wanted && !options.scalars.empty() && isConstant(output))
+    report = convertOthers(*source, options, scalars, std::move(report), progress);
   sayAll(events, source->description(), report);
   noteTimeSteps(files, source->description(), events);
 }
