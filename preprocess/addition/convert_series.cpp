@@ -364,6 +364,10 @@ class SeriesConversion {
   }
 
   std::string whyNot(uint64_t number, const std::string& reason) const {
+    if (options_.is_kept)
+      return number == 0 ? reason
+                         : fmt::format("{}: cannot be a time step after {}: {}", input_.name(number),
+                                       input_.name(0), reason);
     std::string text =
         fmt::format("{}: step {} ({}) cannot be converted: {}", options_.convert.output.string(),
                     numberOf(number), input_.name(number), reason);
@@ -373,7 +377,8 @@ class SeriesConversion {
 
   /// The message about a step that could be left out.
   std::string refusal(uint64_t number, const std::string& reason) const {
-    const bool may_leave_out = !times_.empty() && input_.places.empty() && !options_.keep_going;
+    const bool may_leave_out =
+        !times_.empty() && input_.places.empty() && !options_.keep_going && !options_.is_kept;
     return whyNot(number, reason) + (may_leave_out ? "; --keep-going leaves out such steps" : "");
   }
 

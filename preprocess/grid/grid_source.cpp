@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "stream/base/calendar.h"
 #include "stream/base/error.h"
 #include "stream/base/text.h"
 
@@ -84,8 +85,11 @@ std::optional<std::string> timesText(const GridDescription& description) {
   while (differ && digits < kMaxDigits && numberText(times[0], digits) == numberText(times[1], digits))
     ++digits;
   if (digits > 6) digits = std::min(digits + 2, kMaxDigits);  // where they tell the first steps apart
-  return fmt::format("{} time steps from {} to {}", times.size(), numberText(times.front(), digits),
-                     numberText(times.back(), digits));
+  const TimeUnit unit{description.time_unit, description.calendar};
+  const auto first = dateOf(times.front(), unit), last = dateOf(times.back(), unit);
+  return fmt::format("{} time steps from {} to {}{}", times.size(), numberText(times.front(), digits),
+                     numberText(times.back(), digits),
+                     first && last ? fmt::format(" ({} to {})", *first, *last) : "");
 }
 
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked) {

@@ -41,6 +41,18 @@ TEST_F(KeptCaches, WhatIsKnownOfAFileMayBeDamaged) {
   EXPECT_EQ(kept().size(), 1u);
 }
 
+/// Their user does not know the cache, and cannot leave a step out of it.
+TEST_F(KeptCaches, FilesThatAreNoSeriesAreNamedWithoutTheCache) {
+  for (const char* size : {"8x8x8", "8x8x9"})
+    run({"generate", "wake", "--size", size, "-o", fmt::format("part_{}", size + 4)});
+  const ProgramResult result =
+      runProgram({"render", "part_8.xyz", "part_8.fun", "part_9.fun", "-o", "a.png", "--size", "20x20"});
+  EXPECT_NE(result.status, 0);
+  EXPECT_EQ(result.err.find("kept"), std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("--keep-going"), std::string::npos) << result.err;
+  expectSays(result.err, "part_9.fun: cannot be a time step after ");
+}
+
 /// The pressure of some nodes is negative, so that they have no Mach number: it is kept apart, as `convert` does.
 TEST_F(KeptCaches, AScalarThatSomeNodesLackIsAdded) {
   constexpr std::array<int32_t, 3> kNodes{14, 12, 10};

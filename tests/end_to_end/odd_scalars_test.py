@@ -115,7 +115,7 @@ class OddScalars(MeshCase):
                 f.createVariable("c", "f8", ("time", "z", "y", "x"))[:] = np.stack([first * ramp, 2 * ramp, 4 * ramp])
             picture = [self.folder / "a.nc", "-o", self.folder / "p.png", "--size", "40x40"]
             drawn = self.run_program("render", *picture)
-            self.assertIn(f"3 time steps from 0 to 2; {said} is shown; all of them: curvisplat convert ", drawn.stderr)
+            self.assertIn(f"3 time steps from 0 to 2 (2000-01-01 00:00:00 to 2000-01-03 00:00:00); {said} is shown; all of them: curvisplat convert ", drawn.stderr)
             self.assertIn(f"{self.folder}/a.nc --steps all", drawn.stderr)
             self.assertNotIn("everywhere", drawn.stderr)
             refused = self.run_program("render", *picture, "--step", "1")

@@ -297,6 +297,7 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
   options.convert.precision = precision;
+  options.is_kept = true;
   SeriesInput input = seriesInput(arguments, steps, steps);
   const auto of_files = input.scalars;
   input.scalars = [&](const GridDescription& description) {
