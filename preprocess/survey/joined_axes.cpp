@@ -125,6 +125,33 @@ struct RowEnd {
   bool goesOnIn(const RowEnd& other) const { return block != other.block || (face ^ other.face) == 1; }
 };
 
+/// Two layers of nodes at a face of a block: an outer one, and the one inside of it.
+struct FaceLayers {
+  uint32_t block, face;            // two faces of each axis
+  std::array<uint64_t, 3> counts;  // of nodes in the layers
+  const NodeArrays& nodes;
+
+  size_t axis() const { return face / 2; }
+  std::array<size_t, 2> acrossAxes() const { return {(axis() + 1) % 3, (axis() + 2) % 3}; }
+  bool isUpper() const { return face % 2 != 0; }
+  size_t stride(size_t along) const {
+    return along == 0 ? 1 : along == 1 ? counts[0] : counts[0] * counts[1];
+  }
+  /// Whether a row ends at node n: one of the outer layer, but not at its border.
+  bool isEnd(size_t n) const {
+    return nodes.blank[n] == 0 && n / stride(axis()) % 2 == (isUpper() ? 1 : 0) &&
+           std::ranges::all_of(acrossAxes(), [&](size_t across) {
+             const uint64_t at = n / stride(across) % counts[across];
+             return at > 0 && at + 1 < counts[across];
+           });
+  }
+  /// From node n to the next one of its row.
+  glm::dvec3 inwardFrom(size_t n) const {
+    const size_t next = isUpper() ? n - stride(axis()) : n + stride(axis());
+    return {nodes.x[next] - nodes.x[n], nodes.y[next] - nodes.y[n], nodes.z[next] - nodes.z[n]};
+  }
+};
+
 /// The rows that end within the outer faces of all blocks. Those on the edges of faces lead along other faces as well.
 std::vector<RowEnd> rowEndsOf(const GridSource& source, double step) {
   constexpr double kDeviation = 45;
@@ -134,34 +161,21 @@ std::vector<RowEnd> rowEndsOf(const GridSource& source, double step) {
     const std::array<uint64_t, 3> whole{block.ni, block.nj, block.nk};
     if (std::ranges::min(whole) < 3) continue;
     uint32_t face = 0;
-    forEachFace(
-        source, number,
-        [&](const NodeBox& box, const NodeArrays& nodes) {
-          const uint32_t of_face = face++;
-          const size_t axis = of_face / 2;
-          const bool is_upper = of_face % 2 != 0;
-          const std::array<uint64_t, 3> counts{box.i1 - box.i0, box.j1 - box.j0, box.k1 - box.k0};
-          const std::array<size_t, 3> strides{1, counts[0], counts[0] * counts[1]};
-          const double along = static_cast<double>(whole[axis] - 1);
-          const double part =
-              kDeviation / (along * along *
-                            static_cast<double>((counts[(axis + 1) % 3] - 2) * (counts[(axis + 2) % 3] - 2)));
-          const auto position = [&](size_t n) { return glm::dvec3(nodes.x[n], nodes.y[n], nodes.z[n]); };
-          for (size_t n = 0; n < nodes.x.size(); ++n) {
-            bool is_end = n / strides[axis] % 2 == (is_upper ? 1 : 0);
-            for (const size_t across : {(axis + 1) % 3, (axis + 2) % 3}) {
-              const uint64_t at = n / strides[across] % counts[across];
-              is_end = is_end && at > 0 && at + 1 < counts[across];
-            }
-            if (!is_end || nodes.blank[n] != 0) continue;
-            const glm::dvec3 inward =
-                position(is_upper ? n - strides[axis] : n + strides[axis]) - position(n);
-            if (const double length = glm::length(inward); length > 0 && std::isfinite(length))
-              ends.push_back({placeOf(nodes.x[n], nodes.y[n], nodes.z[n], step), number, of_face, part,
-                              inward / length});
-          }
-        },
-        2);
+    const auto addEnds = [&](const NodeBox& box, const NodeArrays& nodes) {
+      const FaceLayers layers{number, face++, {box.i1 - box.i0, box.j1 - box.j0, box.k1 - box.k0}, nodes};
+      const auto along = static_cast<double>(whole[layers.axis()] - 1);
+      double rows = 1;
+      for (const size_t across : layers.acrossAxes()) rows *= static_cast<double>(layers.counts[across] - 2);
+      const double part = kDeviation / (along * along * rows);
+      for (size_t n = 0; n < nodes.x.size(); ++n) {
+        if (!layers.isEnd(n)) continue;
+        const glm::dvec3 inward = layers.inwardFrom(n);
+        if (const double length = glm::length(inward); length > 0 && std::isfinite(length))
+          ends.push_back({placeOf(nodes.x[n], nodes.y[n], nodes.z[n], step), number, layers.face, part,
+                          inward / length});
+      }
+    };
+    forEachFace(source, number, addEnds, 2);
   }
   std::ranges::stable_sort(ends, std::less<>());
   return ends;

@@ -29,7 +29,7 @@ bool namesTemporaryFile(const std::string& message) {
 int64_t FaultSweep::run(const Fault& fault) const {
   constexpr int64_t kFirstOnes = 6;  // fewer than of bytes: jobs are tried with several faults
   int64_t tried = 0;
-  for (int64_t at = 0;; at += at < kFirstOnes || isWholeSweep() ? 1 : stride, ++tried) {
+  for (int64_t at = 0;; at = nextInSweep(at, stride, kFirstOnes), ++tried) {
     const ::testing::ScopedTrace trace(__FILE__, __LINE__, fmt::format("{} at {}", fault.name, at));
     prepare();
     const size_t descriptors = openDescriptors();

@@ -27,9 +27,8 @@ inline bool isTried(size_t n, size_t stride) {
 
 /// The place to try after this one. The first ones, where files are opened and made, are all tried; of the others
 /// usually one in `stride`, which should have no divisor in common with what repeats in the job.
-inline int64_t nextInSweep(int64_t place, int64_t stride) {
-  constexpr int64_t kFirstOnes = 12;
-  return place + (place < kFirstOnes || isWholeSweep() ? 1 : stride);
+inline int64_t nextInSweep(int64_t place, int64_t stride, int64_t first_ones = 12) {
+  return place + (place < first_ones || isWholeSweep() ? 1 : stride);
 }
 
 /// A fault at the n-th call of a kind.

@@ -294,12 +294,10 @@ std::string ServedCaches::commandText(const CommandRequest& request) const {
   return textOf({{"type", "command"}, {"cache", request.cache}, {"text", text}, {"files", files}});
 }
 
-std::string ServedCaches::refusalText(const std::string& text) {
-  return textOf({{"type", "error"}, {"text", text}});
-}
-
-std::string ServedCaches::reducedText(const std::string& text) {
-  return textOf({{"type", "error"}, {"text", text}, {"reduced", true}});
+std::string ServedCaches::refusalText(const std::string& text, bool reduced) {
+  Json message{{"type", "error"}, {"text", text}};
+  if (reduced) message["reduced"] = true;
+  return textOf(message);
 }
 
 std::string ServedCaches::errorText(std::string text) const {

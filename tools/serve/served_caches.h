@@ -77,10 +77,9 @@ class ServedCaches {
 
   /// An error for a page: `text` without paths of this machine.
   std::string errorText(std::string text) const;
-  /// An error for a page, of a text that has no paths.
-  static std::string refusalText(const std::string& text);
-  /// The error that a picture has fewer pixels than were asked for; a page that saves the picture waits for it still.
-  static std::string reducedText(const std::string& text);
+  /// An error for a page, of a text that has no paths. `reduced`: a picture has fewer pixels than were asked for, and comes still: a page
+  /// that saves it waits for it.
+  static std::string refusalText(const std::string& text, bool reduced = false);
 
  private:
   const ServedCache& at(size_t cache) const;
