@@ -8,6 +8,8 @@
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -78,6 +80,44 @@ class WindowTest : public ProgramSuite<WindowTest> {
     std::optional<Place> place;
     EXPECT_TRUE(eventually([&] { return (place = placeNow(widget, across, down)).has_value(); })) << widget;
     return place.value_or(Place{});
+  }
+  /// The name of the widget that begins so, once it is there.
+  static std::string widget(const std::string& begin) {
+    std::string name;
+    EXPECT_TRUE(eventually([&] {
+      std::ifstream file("widgets");
+      for (std::string line; std::getline(file, line);) {
+        const size_t at = line.find(" " + begin);
+        if (at == std::string::npos) continue;
+        name = line.substr(at + 1);
+        return true;
+      }
+      return false;
+    })) << begin;
+    return name;
+  }
+  /// Returns how far the viewer is from the focal point of a command.
+  static double distanceOf(const Words& command) {
+    std::array<double, 3> ends[2];
+    for (const int end : {0, 1}) {
+      char comma;
+      std::istringstream text(valueOf(command, end == 0 ? "--position" : "--focal-point"));
+      text >> ends[end][0] >> comma >> ends[end][1] >> comma >> ends[end][2];
+    }
+    return std::hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1], ends[1][2] - ends[0][2]);
+  }
+  /// The numbers of an option's value, with commas between them.
+  static std::array<double, 6> numbersOf(const std::string& text) {
+    std::array<double, 6> numbers{};
+    std::istringstream stream(text);
+    for (double& number : numbers) {
+      stream >> number;
+      stream.ignore();
+    }
+    return numbers;
+  }
+  static bool gone(const std::string& begin) {
+    return eventually([&] { return !hasWidget(begin); });
   }
   /// The next click, or a drag in the panels, is for another frame of the window's: save() lies between.
   void click(Place place) {

@@ -1,4 +1,4 @@
-// Panels and menus of the window: values and markers, planes in the picture, two scalars, undo, saved views,
+// Panels and menus of the window: values and markers, planes in the picture, undo, saved views,
 // messages, keys.
 #include <array>
 #include <cmath>
@@ -15,51 +15,12 @@ namespace fs = std::filesystem;
 
 class WindowPanels : public WindowTest {
  protected:
-  /// The name of the widget that begins so, once it is there.
-  static std::string widget(const std::string& begin) {
-    std::string name;
-    EXPECT_TRUE(eventually([&] {
-      std::ifstream file("widgets");
-      for (std::string line; std::getline(file, line);) {
-        const size_t at = line.find(" " + begin);
-        if (at == std::string::npos) continue;
-        name = line.substr(at + 1);
-        return true;
-      }
-      return false;
-    })) << begin;
-    return name;
-  }
   void openMarkers() {
     tab("Objects");
     click("Markers");
   }
-  /// Returns how far the viewer is from the focal point of a command.
-  static double distanceOf(const Words& command) {
-    std::array<double, 3> ends[2];
-    for (const int end : {0, 1}) {
-      char comma;
-      std::istringstream text(valueOf(command, end == 0 ? "--position" : "--focal-point"));
-      text >> ends[end][0] >> comma >> ends[end][1] >> comma >> ends[end][2];
-    }
-    return std::hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1], ends[1][2] - ends[0][2]);
-  }
-  /// The numbers of an option's value, with commas between them.
-  static std::array<double, 6> numbersOf(const std::string& text) {
-    std::array<double, 6> numbers{};
-    std::istringstream stream(text);
-    for (double& number : numbers) {
-      stream >> number;
-      stream.ignore();
-    }
-    return numbers;
-  }
-  static bool gone(const std::string& begin) {
-    return eventually([&] { return !hasWidget(begin); });
-  }
 };
 
-/// The window shows markers by signs of its own; what it saves has them, and the command draws them.
 TEST_F(WindowPanels, TheValueUnderTheMouseIsThatOfTheDataAndMarkersKeepIt) {
   open();
   const Image without = save();
@@ -347,89 +308,6 @@ TEST_F(WindowPanels, NothingIsCutOffAtThePanelsEdge) {
   close();
 }
 
-/// The scalar of the scene reaches from 0 to about 1, and is stored in 65,535 steps. The range that leaves out one per cent at each end
-/// is that of `render --range 1%,99%`.
-TEST_F(WindowPanels, RangesMayBeTooFineAndLeaveOutThePercentiles) {
-  open();
-  placeOf("range");
-  EXPECT_FALSE(hasWidget("warning "));
-  click(placeOf("range", 0.15));
-  press("ctrl+a");
-  act({"type", "0.49999"});
-  press("Tab");
-  press("ctrl+a");
-  act({"type", "0.50001"});
-  press("Return");
-  EXPECT_TRUE(eventually([] { return hasWidget("warning the range 0.49999..0.50001 of f is finer than"); }));
-  click("full range");
-  EXPECT_TRUE(eventually([] { return !hasWidget("warning "); }));
-  const Image whole = save();
-  moveTo(placeOf("full range"));
-  EXPECT_TRUE(eventually([] { return hasWidget("hint from the lowest to the highest value: 0"); }));
-  click("percentile range");
-  const Image most = saveAndCopy();
-  EXPECT_LT(difference(whole, most), 50);
-  const auto range = numbersOf(valueOf(close().at(0), "--range"));
-  const auto percentiles =
-      nlohmann::json::parse(run({"info", "--json", "a.splats"}).out).at("histograms")[0].at("percentiles");
-  EXPECT_NEAR(range[0], percentiles[10].get<double>(), 1e-3);
-  EXPECT_NEAR(range[1], percentiles[990].get<double>(), 1e-3);
-}
-
-TEST_F(WindowPanels, OpacitiesOfAnotherScalar) {
-  open();
-  const Image one = saveAndCopy();
-  click("opacity by");
-  click("opacity by volume");
-  const Image two = saveAndCopy();
-  EXPECT_LT(difference(one, two), 40);
-  click("clear");
-  EXPECT_LT(difference(save(), two), 40);
-  click("automatic");  // the opacities of the other scalar
-  EXPECT_TRUE(eventually([&] { return difference(save(), two) >= 50; }));
-  click("opacity by");
-  click("opacity by the same scalar");
-  EXPECT_GE(difference(save(), one), 50);
-  const auto commands = close();
-  ASSERT_EQ(commands.size(), 2u);
-  EXPECT_EQ(valueOf(commands[1], "--scalar"), "f");
-  EXPECT_EQ(valueOf(commands[1], "--opacity-by"), "volume");
-  expectDraws(commands[1], two);
-  // The second bar takes of the width, and cuts nothing: the viewer has stepped back, and at the end forth again.
-  EXPECT_GT(distanceOf(commands[1]), 1.03 * distanceOf(commands[0]));
-}
-
-/// Faces with the opacity "function": alone, so that nothing else changes.
-TEST_F(WindowPanels, FacesHaveTheOpacitiesOfTheOtherScalar) {
-  if (!faults::isWholeSweep())
-    GTEST_SKIP() << "OpacitiesOfAnotherScalar chooses them, SurfaceOptions draws such faces";
-  open({"--surface", "kmin", "--surface-by", "f", "--surface-opacity", "function", "--volume", "off"});
-  const Image one = saveAndCopy();
-  click("opacity by");
-  click("opacity by volume");
-  const Image two = saveAndCopy();
-  EXPECT_LT(difference(one, two), 40);
-  const auto commands = close();
-  ASSERT_EQ(commands.size(), 2u);
-  expectDraws(commands[0], one);
-  expectDraws(commands[1], two);
-}
-
-/// Faces that are coloured by f have the picture's colours as long as it shows f, then their own and a bar for them.
-TEST_F(WindowPanels, FacesKeepTheirScalar) {
-  if (!faults::isWholeSweep())
-    GTEST_SKIP() << "WindowSurfaces.IsosurfacesAreMovedAndKeepTheirScalar does so with isosurfaces";
-  open({"--surface", "kmin", "--surface-by", "f"});
-  const Image of_f = saveAndCopy();
-  chooseScalar("volume");
-  const Image of_volume = saveAndCopy();
-  const auto commands = close();
-  ASSERT_EQ(commands.size(), 2u);
-  EXPECT_EQ(valueOf(commands[1], "--scalar"), "volume");
-  expectDraws(commands[0], of_f);
-  expectDraws(commands[1], of_volume);
-}
-
 TEST_F(WindowPanels, UndoAndRedo) {
   if (!faults::isWholeSweep()) GTEST_SKIP() << "tests of WindowSurfaces undo more";
   open();
@@ -542,118 +420,6 @@ TEST_F(WindowPanels, ThemeAndTextSizeAreRemembered) {
   open();
   EXPECT_TRUE(eventually([&] { return panelWidth() > before && paper() > 0.7f; }));
   close();
-}
-
-TEST_F(WindowPanels, EditsColoursAndKeepsThemBesideThePicture) {
-  open();
-  const Image first = save();
-  for (const char* next : {"colour points", "edit these colours"}) {
-    click(next);
-    save();
-  }
-  placeOf("colour 9");  // nine, each with its picker
-  const Image edited = saveAndCopy();
-  EXPECT_GT(difference(first, edited), 25);  // nearly the same colours, of fewer points
-  const auto command = close().at(0);
-  EXPECT_EQ(valueOf(command, "--tf"), "a_colours.json");
-  expectDraws(command, edited);
-}
-
-TEST_F(WindowPanels, ARampKeepsTheLogarithmicScale) {
-  open();
-  chooseScalar("volume");  // above zero
-  save();
-  widget("scale ");
-  click("log scale");
-  widget("scale logarithmic");
-  const Image before = save();
-  click("ramp");
-  moveTo(rest_);
-  EXPECT_TRUE(eventually([&] { return difference(before, save()) < 50; }));
-  EXPECT_TRUE(hasWidget("scale logarithmic"));
-  close();
-}
-
-/// The button chooses range and opacities; the colours are chosen in their own list, from their swatches.
-TEST_F(WindowPanels, AutomaticOpacitiesKeepTheChosenColours) {
-  open();
-  const Image first = save();
-  click("colours");
-  click("colours viridis");
-  const Image viridis = saveAndCopy();
-  EXPECT_LT(difference(first, viridis), 40);
-  click("clear");
-  EXPECT_LT(difference(viridis, save()), 50);
-  click("automatic");
-  EXPECT_TRUE(eventually([&] { return difference(save(), viridis) >= 50; }));
-  click("colours");
-  click("colours chosen from the data");
-  EXPECT_TRUE(eventually([&] { return difference(save(), first) >= 50; }));
-  const auto command = close().at(0);
-  EXPECT_EQ(valueOf(command, "--tf"), "viridis");
-  expectDraws(command, viridis);
-}
-
-/// A point in the curve's corner lies half outside of it, and can be taken there. The histogram of gradients says magnitudes and shares.
-TEST_F(WindowPanels, CurveAndHistogramAnswerTheMouse) {
-  open();
-  save();
-  click("clear");
-  const Image nothing = save();
-  const auto [x, y] = placeOf("curve", 1, 1);
-  drag(1, {x + 3, y + 3}, placeOf("curve", 1, 0.2));
-  EXPECT_LT(difference(nothing, save()), 45);
-  click("gradient opacity");
-  const auto under = [&](double across) {
-    moveTo(placeOf("gradient histogram", across));
-    const std::string before = hasWidget("gradient of ") ? widget("gradient of ") : "";
-    EXPECT_TRUE(eventually([&] { return hasWidget("gradient of ") && widget("gradient of ") != before; }));
-    const std::string text = widget("gradient of ");
-    std::smatch parts;
-    EXPECT_TRUE(std::regex_match(
-        text, parts,
-        std::regex("gradient of (\\S+) per length: (\\S+) % of the volume is less steep; opacity x (\\S+)")))
-        << text;
-    return parts.size() == 4 ? std::array{std::stod(parts[1]), std::stod(parts[2]), std::stod(parts[3])}
-                             : std::array<double, 3>{};
-  };
-  const auto gentle = under(0.1), steep = under(0.98);
-  EXPECT_GT(gentle[0], 0);
-  EXPECT_GT(steep[0], 2 * gentle[0]);
-  EXPECT_LT(gentle[1], 50);
-  EXPECT_GT(steep[1], 80);
-  EXPECT_EQ(gentle[2], 0);  // it rises from 50 to 80 %
-  EXPECT_EQ(steep[2], 1);
-  close();
-}
-
-/// A range of both signs gets zero in its middle. A name that its list's box cannot show is in the box's hint.
-TEST_F(WindowPanels, ValuesOfBothSignsAndALongName) {
-  const std::string name = "difference_of_the_pressure_from_its_mean_in_time";
-  std::ofstream grid("signed.vtk");
-  grid
-      << "# vtk DataFile Version 3.0\nbox\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 6 6 6\nORIGIN 0 0 0\n"
-      << "SPACING 1 1 1\nPOINT_DATA 216\nSCALARS " << name << " float\nLOOKUP_TABLE default\n";
-  for (int n = 0; n < 216; ++n) grid << 0.02 * n - 1 << '\n';
-  grid.close();
-  run({"convert", "signed.vtk", "-o", "signed.splats"});
-  cache_ = "signed";
-  open();
-  moveTo(placeOf("opacity by"));
-  save();
-  EXPECT_FALSE(hasWidget("hint "));  // its text fits
-  moveTo(placeOf("scalar"));
-  widget("hint " + name);
-  click("full range");
-  moveTo(rest_);
-  saveAndCopy();
-  click("symmetric range");
-  moveTo(rest_);
-  saveAndCopy();
-  const auto commands = close();
-  ASSERT_EQ(commands.size(), 2u);
-  EXPECT_EQ(valueOf(commands[0], "--range"), "-1,3.3");
-  EXPECT_EQ(valueOf(commands[1], "--range"), "-3.3,3.3");
 }
 
 /// Braces in a title are no fields of --title. The button below the panels asks for name and size of a picture; the folder that was
