@@ -28,7 +28,7 @@ constexpr double kMeanDepth = 1.05;  // over what is seen: an absorption of 65 %
 // kContext of the silhouette.
 constexpr double kMaterialsDepth = 0.6, kTwoMaterialsDepth = 0.3, kContextDepth = 0.15, kContext = 0.6;
 constexpr double kDivergingShare = 0.25;   // of the lesser sign, in the interval: of the other's length
-constexpr double kDivergingVolume = 0.02;  // of the lesser sign, in the volume
+constexpr double kDivergingVolume = 0.02;  // of the lesser sign, in the volume that is not zero
 constexpr int kRangeDigits = 3, kUnitDigits = 3;
 
 bool isDiverging(const std::string& map) {
@@ -109,20 +109,23 @@ class FirstChoice::Fit {
       const DefaultMaps& maps)
       : data_(data), histogram_(histogram), extinctions_(extinctionsOf(histogram)), map_(map), maps_(maps) {}
 
+  struct Fitted {
+    FunctionParts parts;
+    bool is_diverging = false;  // zero is in the middle of the range
+  };
   /// A function of the interval [begin, end] of the histogram's axis. nullopt: its ends are one number in a few digits.
-  std::optional<FunctionParts> over(double begin, double end) const;
+  std::optional<Fitted> over(double begin, double end) const;
   /// A function of the interval outside of which little is seen.
-  std::optional<FunctionParts> overSeen() const {
+  std::optional<Fitted> overSeen() const {
     const auto [begin, end] = seenInterval(histogram_, extinctions_);
     return over(begin, end);
   }
-  /// A function of the part of the interval that is seen with this one, if that is much smaller.
-  std::optional<FunctionParts> narrowed(const FunctionParts& parts) const;
-  bool diverges(const FunctionParts& parts) const { return diverges(beginOf(parts), endOf(parts)); }
+  /// A function of the part of the interval that is seen with this one; this one where that is not much smaller.
+  FunctionParts narrowed(const Fitted& whole) const;
 
  private:
-  /// Whether the interval has much of both signs. Where no map is named, so has the volume: a few values beyond zero do not make a field
-  /// of two signs.
+  /// Whether the interval has much of both signs. Where no map is named, so has the volume: a few overshoots beyond zero do not make a
+  /// field of two signs.
   bool diverges(double begin, double end) const;
   double beginOf(const FunctionParts& parts) const { return histogram_.coordinate(parts.range.first); }
   double endOf(const FunctionParts& parts) const { return histogram_.coordinate(parts.range.second); }
@@ -139,13 +142,14 @@ bool FirstChoice::Fit::diverges(double begin, double end) const {
   if (!(below > 0 && above > 0 && std::min(below, above) > kDivergingShare * std::max(below, above)))
     return false;
   if (!map_.empty()) return isDiverging(map_);
-  double negative = 0;
+  const size_t bin_of_zero = histogram_.binOf(0);
+  double negative = 0, positive = 0;
   for (size_t bin = 0; bin < VolumeHistogram::kBins; ++bin)
-    if (histogram_.middle(bin) < zero) negative += histogram_.shares[bin];
-  return std::min(negative, 1 - negative) > kDivergingVolume;
+    if (bin != bin_of_zero) (bin < bin_of_zero ? negative : positive) += histogram_.shares[bin];
+  return std::min(negative, positive) > kDivergingVolume * (negative + positive);
 }
 
-std::optional<FunctionParts> FirstChoice::Fit::over(double begin, double end) const {
+std::optional<FirstChoice::Fit::Fitted> FirstChoice::Fit::over(double begin, double end) const {
   const bool diverging = diverges(begin, end);
   const double low = histogram_.scalar(begin), high = histogram_.scalar(end);
   if (diverging) {
@@ -166,14 +170,16 @@ std::optional<FunctionParts> FirstChoice::Fit::over(double begin, double end) co
   parts.opacities = opacityPoints(histogram_, extinctions_, beginOf(parts), endOf(parts));
   parts.map = !map_.empty() ? map_ : diverging ? maps_.diverging : maps_.sequential;
   parts.opacity_unit = data_.opacityUnitOf(parts.function());
-  return parts;
+  return Fitted{parts, diverging};
 }
 
-std::optional<FunctionParts> FirstChoice::Fit::narrowed(const FunctionParts& parts) const {
+FunctionParts FirstChoice::Fit::narrowed(const Fitted& whole) const {
+  const FunctionParts& parts = whole.parts;
   const auto interval =
       narrowedInterval(histogram_, data_.seenIn(histogram_, parts.function()), beginOf(parts), endOf(parts),
-                       diverges(parts) ? std::optional(histogram_.coordinate(0)) : std::nullopt);
-  return interval ? over(interval->first, interval->second) : std::nullopt;
+                       whole.is_diverging ? std::optional(histogram_.coordinate(0)) : std::nullopt);
+  const auto narrower = interval ? over(interval->first, interval->second) : std::nullopt;
+  return narrower ? narrower->parts : parts;
 }
 
 FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& maps, bool with_sheets) const {
@@ -189,11 +195,11 @@ FunctionParts FirstChoice::function(const std::string& map, const DefaultMaps& m
   const Fit fit(*this, *histogram, map, maps);
   if (const size_t values = fillingValues(*histogram); values > 1)
     if (const auto all = fit.over(histogram->low, histogram->high))
-      return inHaze(values > 2 ? kMaterialsDepth : kTwoMaterialsDepth, *all);
-  const std::optional<FunctionParts> whole = fit.overSeen();
+      return inHaze(values > 2 ? kMaterialsDepth : kTwoMaterialsDepth, all->parts);
+  const auto whole = fit.overSeen();
   if (!whole) return constant();
   // Slices and faces show what the volume hides.
-  const FunctionParts parts = with_sheets ? *whole : fit.narrowed(*whole).value_or(*whole);
+  const FunctionParts parts = with_sheets ? whole->parts : fit.narrowed(*whole);
   return isWithoutContext(parts.function()) ? inHaze(kContextDepth, parts) : parts;
 }
 

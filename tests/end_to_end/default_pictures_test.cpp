@@ -191,18 +191,20 @@ TEST_F(DefaultPictures, RangesByPercentilesAndOfAllData) {
 }
 
 /// Values from -0.42 to 0.58: the middle colour of a diverging map is that of zero, whether the map is chosen or named. Below zero but for
-/// six samples, they get no such map unasked.
+/// six samples, they get no such map unasked; a few of either sign in much that is zero do.
 TEST_F(DefaultPictures, DivergingMapsAreCentred) {
-  constexpr int kSide = 14;
-  const auto convertOf = [&](double low, double high, int beyond) {
+  constexpr int kSide = 14, kNodes = kSide * kSide * kSide;
+  const auto across = [](double low, double high, int n) {
+    return std::lerp(low, high, n % kSide / (kSide - 1.0));
+  };
+  const auto convertOf = [&](const std::function<double(int)>& valueAt) {
     std::ofstream grid(file("signed.xyz")), values(file("signed.fun"));
     grid << fmt::format("{0} {0} {0}\n", kSide);
     values << fmt::format("{0} {0} {0} 1\n", kSide);
     for (int axis = 0; axis < 3; ++axis)
-      for (int n = 0; n < kSide * kSide * kSide; ++n)
+      for (int n = 0; n < kNodes; ++n)
         grid << (axis == 0 ? n : axis == 1 ? n / kSide : n / kSide / kSide) % kSide / (kSide - 1.0) << '\n';
-    for (int n = 0; n < kSide * kSide * kSide; ++n)
-      values << (n < beyond ? 0.1 * (n + 1) : std::lerp(low, high, n % kSide / (kSide - 1.0))) << '\n';
+    for (int n = 0; n < kNodes; ++n) values << valueAt(n) << '\n';
     grid.close();
     values.close();
     run({"convert", file("signed.xyz"), file("signed.fun"), "-o", file("a.splats"), "--overwrite"});
@@ -216,13 +218,16 @@ TEST_F(DefaultPictures, DivergingMapsAreCentred) {
     ADD_FAILURE() << testing::PrintToString(chosen);
     return 1.0;
   };
-  convertOf(-0.42, 0.58, 0);
+  convertOf([&](int n) { return across(-0.42, 0.58, n); });
   EXPECT_NEAR(middleOf({}), 0, 1e-9);
   EXPECT_NEAR(middleOf({"--tf", "cool-warm"}), 0, 1e-9);
   EXPECT_GT(std::abs(middleOf({"--tf", "viridis"})), 0.05);
-  convertOf(-0.24, -0.02, 6);
+  convertOf([&](int n) { return n < 6 ? 0.1 * (n + 1) : across(-0.24, -0.02, n); });
   EXPECT_GT(std::abs(middleOf({})), 0.05);
   EXPECT_NEAR(middleOf({"--tf", "cool-warm"}), 0, 1e-9);
+  constexpr int kFew = 12;
+  convertOf([&](int n) { return n < kFew ? 0.05 * (n + 1) : n < kNodes - kFew ? 0 : -0.05 * (kNodes - n); });
+  EXPECT_NEAR(middleOf({}), 0, 1e-9);
 }
 
 /// A dense core behind haze takes no colours from what is seen, but where a slice shows it.
