@@ -73,6 +73,7 @@ class SeriesConversion {
     } catch (const UsageError&) {
       throw;
     } catch (const OutputError& error) {
+      if (options_.is_kept) throw;
       throw OutputError(whyNot(number, error.what()));
     } catch (const Error& error) {
       leaveOut(number, error.what());
@@ -364,10 +365,12 @@ class SeriesConversion {
   }
 
   std::string whyNot(uint64_t number, const std::string& reason) const {
-    if (options_.is_kept)
-      return number == 0 ? reason
-                         : fmt::format("{}: cannot be a time step after {}: {}", input_.name(number),
-                                       input_.name(0), reason);
+    if (options_.is_kept) {
+      const std::string file = input_.name(number) + ": ";
+      if (number == 0) return reason;
+      return fmt::format("{}cannot be a time step after {}: {}", file, input_.name(0),
+                         reason.starts_with(file) ? reason.substr(file.size()) : reason);
+    }
     std::string text =
         fmt::format("{}: step {} ({}) cannot be converted: {}", options_.convert.output.string(),
                     numberOf(number), input_.name(number), reason);
@@ -383,6 +386,7 @@ class SeriesConversion {
   }
 
   std::string whereItStands(const std::string& of_first) const {
+    if (options_.is_kept) return "interrupted";
     if (times_.empty()) return of_first;
     return fmt::format("{}: interrupted after {}; continue with the same command and --resume",
                        options_.convert.output.string(), countText(times_.size(), "step"));

@@ -22,7 +22,7 @@ struct SeriesOptions {
   bool keep_going = false;              // leave out steps that do not fit
   bool add = false;                     // to an existing cache, which has other steps
   bool to_part = false;                 // the first step is there for its geometry (series_steps.h)
-  bool is_kept = false;                 // the user knows the files alone: messages do not name the cache
+  bool is_kept = false;                 // in the user's cache folder: messages name the files only
   std::function<void()> before_change;  // called before the cache changes, if it does; may throw Error
 };
 

@@ -89,7 +89,7 @@ std::optional<std::string> timesText(const GridDescription& description) {
   const auto first = dateOf(times.front(), unit), last = dateOf(times.back(), unit);
   return fmt::format("{} time steps from {} to {}{}", times.size(), numberText(times.front(), digits),
                      numberText(times.back(), digits),
-                     first && last ? fmt::format(" ({} to {})", *first, *last) : "");
+                     first && last && *first != *last ? fmt::format(" ({} to {})", *first, *last) : "");
 }
 
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked) {

@@ -166,7 +166,7 @@ bool answersTo(const GridScalar& scalar, const std::string& simple);
 uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
                         std::optional<uint32_t> asked);
 
-/// "3 time steps from 0 to 2.5", with the dates behind where the unit has them; nullopt if there is a single step.
+/// "3 time steps from 0 to 2.5", followed by their dates if the unit has them; nullopt if there is a single step.
 std::optional<std::string> timesText(const GridDescription& description);
 
 /// A note for users who have not chosen between several steps: "3 time steps from 0 to 2.5; using the first:

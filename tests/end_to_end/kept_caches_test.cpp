@@ -41,7 +41,7 @@ TEST_F(KeptCaches, WhatIsKnownOfAFileMayBeDamaged) {
   EXPECT_EQ(kept().size(), 1u);
 }
 
-/// Their user does not know the cache, and cannot leave a step out of it.
+/// The user does not know the cache, and cannot leave a step out of it.
 TEST_F(KeptCaches, FilesThatAreNoSeriesAreNamedWithoutTheCache) {
   for (const char* size : {"8x8x8", "8x8x9"})
     run({"generate", "wake", "--size", size, "-o", fmt::format("part_{}", size + 4)});
@@ -51,6 +51,25 @@ TEST_F(KeptCaches, FilesThatAreNoSeriesAreNamedWithoutTheCache) {
   EXPECT_EQ(result.err.find("kept"), std::string::npos) << result.err;
   EXPECT_EQ(result.err.find("--keep-going"), std::string::npos) << result.err;
   expectSays(result.err, "part_9.fun: cannot be a time step after ");
+}
+
+TEST_F(KeptCaches, ASeriesThatIsStoppedIsNamedWithoutTheCache) {
+  run({"generate", "wake", "--size", "100x80x60", "--steps", "4", "-o", "long"});
+  RunningProgram render({"render", "long.xyz", "long_0000.fun", "long_0001.fun", "long_0002.fun",
+                         "long_0003.fun", "-o", "a.png", "--size", "20x20", "--threads", "1"});
+  ASSERT_TRUE(eventually([] {
+    std::error_code error;
+    for (fs::recursive_directory_iterator at("kept/curvisplat", error), end; !error && at != end;
+         at.increment(error))
+      if (at->path().filename() == "manifest.json") return true;
+    return false;
+  }));
+  render.signal(SIGTERM);
+  const ProgramResult result = render.wait();
+  EXPECT_EQ(result.status, 128 + SIGTERM);
+  expectSays(result.err, "interrupted");
+  EXPECT_EQ(result.err.find("kept"), std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find("--resume"), std::string::npos) << result.err;
 }
 
 /// The pressure of some nodes is negative, so that they have no Mach number: it is kept apart, as `convert` does.

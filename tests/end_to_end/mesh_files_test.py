@@ -15,6 +15,7 @@ import struct
 import subprocess
 import sys
 import unittest
+import unittest.mock
 
 try:
     import numpy as np
@@ -633,8 +634,9 @@ class MeshFiles(MeshCase):
 
     def test_the_last_step_is_drawn_before_scalars_of_the_other_centring(self):
         import netCDF4
-        os.environ["XDG_CACHE_HOME"] = str(self.folder / "kept")
-        self.addCleanup(os.environ.pop, "XDG_CACHE_HOME")
+        kept = unittest.mock.patch.dict(os.environ, XDG_CACHE_HOME=str(self.folder / "kept"))
+        kept.start()
+        self.addCleanup(kept.stop)
         path = self.folder / "uniform.e"
         self.write_exodus(path)
         with netCDF4.Dataset(path, "a") as f:

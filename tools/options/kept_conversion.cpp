@@ -221,6 +221,10 @@ ConvertReport convertNarrow(const DataSource& source, const ConvertOptions& all,
   }
 }
 
+bool isSameScalar(const GridScalar& a, const GridScalar& b) {
+  return a.name == b.name && a.centring == b.centring && a.derived == b.derived;
+}
+
 bool isConstant(const fs::path& cache) {
   return std::ranges::all_of(readManifest(cache).variables, isNearlyConstant);
 }
@@ -253,7 +257,8 @@ std::vector<std::vector<uint32_t>> othersThan(const GridDescription& description
   return others;
 }
 
-/// Converts, in place of the scalars of `options`, which are constant, the first others that are not; these again if all are.
+/// Converts the first other scalars that vary, in place of those of `options`, which are constant. If none varies, converts those of
+/// `options` again.
 ConvertReport convertOthers(const DataSource& source, const ConvertOptions& options,
                             const std::vector<std::string>& wanted, ConvertReport report_of_first,
                             Progress& progress) {
@@ -342,20 +347,31 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
   options.scalars = scalarsOf(arguments, scalars, source->description());
   makePreview(*source, options, false, progress, events);
   ConvertReport report = convertNarrow(*source, options, scalars, progress);
-  // Cases that begin with a uniform medium.
-  if (const size_t steps = source->description().times.size(); steps > 1 && isConstant(output)) {
-    arguments.grid.time_step = static_cast<uint32_t>(steps - 1);
-    const GridDescription first = source->description();
+  const auto takeStep = [&](uint32_t step) {
+    arguments.grid.time_step = step;
+    const std::vector<GridScalar> before = source->description().scalars;
     source = openSource(arguments, output);
-    // Scalars are chosen again, which prints notes, only where the step has others.
-    if (!std::ranges::equal(first.scalars, source->description().scalars, {}, &GridScalar::name,
-                            &GridScalar::name))
+    // Choosing scalars prints notes; it is repeated only if the step has other scalars.
+    if (!std::ranges::equal(before, source->description().scalars, isSameScalar))
       options.scalars = scalarsOf(arguments, scalars, source->description());
+  };
+  const auto varies = [&] { return options.scalars.empty() || !isConstant(output); };
+  const auto takeOthers = [&] {
+    if (std::ranges::all_of(scalars, &std::string::empty))
+      report = convertOthers(*source, options, scalars, std::move(report), progress);
+  };
+  // Cases that begin with a uniform medium are shown as they end; where that is uniform, too, by another scalar.
+  const size_t steps = source->description().times.size();
+  if (steps > 1 && !varies()) {
+    takeStep(static_cast<uint32_t>(steps - 1));
     report = convertNarrow(*source, options, scalars, progress);
   }
-  const bool none_is_wanted = std::ranges::all_of(scalars, &std::string::empty);
-  if (none_is_wanted && !options.scalars.empty() && isConstant(output))
-    report = convertOthers(*source, options, scalars, std::move(report), progress);
+  if (!varies()) takeOthers();
+  if (steps > 1 && !varies()) {
+    takeStep(0);
+    report = convertNarrow(*source, options, scalars, progress);
+    takeOthers();
+  }
   sayAll(events, source->description(), report);
   noteTimeSteps(files, source->description(), events);
 }
