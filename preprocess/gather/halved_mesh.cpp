@@ -58,7 +58,7 @@ void sortAndUnite(std::vector<Middle>& middles) {
   middles.erase(std::unique(middles.begin(), middles.end()), middles.end());
 }
 
-/// Polyhedra cannot, nor parts of curved cells: their volumes are the file's, not those of their corners.
+/// Whether a cell is halved: polyhedra are not, nor parts of curved cells, whose volumes are the file's, not those of their corners.
 bool canBeHalved(const MeshCells& cells, size_t n) {
   return cornersOf(cells.shapes[n]) > 0 && (cells.volumes.empty() || !(cells.volumes[n] > 0));
 }
@@ -66,8 +66,8 @@ bool canBeHalved(const MeshCells& cells, size_t n) {
 /// Finds points of a piece by their places, to what single precision rounds.
 class PointsByPlace {
  public:
-  /// `is_corner` [point]: others are not found. A file may have points in the middles of edges that its cells do not use.
-  PointsByPlace(const MeshSource& source, uint32_t piece, const std::vector<bool>& is_corner) {
+  /// `is_used` [point]: whether a cell has it. Only such points are found: a file may store middles of edges that its cells leave out.
+  PointsByPlace(const MeshSource& source, uint32_t piece, const std::vector<bool>& is_used) {
     const uint64_t count = source.description().pieces[piece].points;
     MeshPoints points;
     double largest = 0;
@@ -82,7 +82,7 @@ class PointsByPlace {
     }
     reach_ = 2 * largest * std::numeric_limits<float>::epsilon();
     for (size_t n = 0; n < places_.size(); ++n) {
-      if (!is_corner[n] || !isFinite(places_[n])) continue;
+      if (!is_used[n] || !isFinite(places_[n])) continue;
       const auto [at, is_new] = known_.try_emplace(boxOf(places_[n]), static_cast<uint32_t>(n));
       if (!is_new) at->second = kNoPoint;
     }
@@ -211,7 +211,7 @@ class HalvedMesh final : public ForwardingMesh {
 
  private:
   HalvedPiece measured(uint32_t piece) const;
-  void findPoints(uint32_t piece, const std::vector<bool>& is_corner, HalvedPiece& of) const;
+  void findPoints(uint32_t piece, const std::vector<bool>& is_used, HalvedPiece& of) const;
   void readMiddles(uint32_t piece, std::span<const Middle> middles, std::span<const uint32_t> scalars,
                    MeshPoints& out) const;
 
@@ -238,14 +238,14 @@ HalvedPiece HalvedMesh::measured(uint32_t piece) const {
   HalvedPiece found;
   std::vector<Middle>& middles = found.middles;
   size_t united = 0;
-  std::vector<bool> is_corner(whole.points, false);
+  std::vector<bool> is_used(whole.points, false);
   MeshCells cells;
   for (uint64_t first = 0; first < whole.cells; first += kCellsReadAtOnce) {
     const uint64_t count = std::min(kCellsReadAtOnce, whole.cells - first);
     source().readCells(piece, first, count, {}, cells);
     checkCells(cells, whole, first);
     for (size_t n = 0; n < count; ++n) {
-      for (const uint64_t corner : cells.cornersOfCell(n)) is_corner[corner] = true;
+      for (const uint64_t corner : cells.cornersOfCell(n)) is_used[corner] = true;
       const bool is_halved = canBeHalved(cells, n);
       found.begins.push_back(found.begins.back() +
                              (is_halved ? partsOf(cells.shapes[n], kHalved).size() : 1));
@@ -260,13 +260,13 @@ HalvedPiece HalvedMesh::measured(uint32_t piece) const {
   }
   sortAndUnite(middles);
   middles.shrink_to_fit();
-  findPoints(piece, is_corner, found);
+  findPoints(piece, is_used, found);
   return found;
 }
 
 /// Finds the point of each middle: where a node of smaller cells hangs, it is that one.
-void HalvedMesh::findPoints(uint32_t piece, const std::vector<bool>& is_corner, HalvedPiece& of) const {
-  const PointsByPlace known(source(), piece, is_corner);
+void HalvedMesh::findPoints(uint32_t piece, const std::vector<bool>& is_used, HalvedPiece& of) const {
+  const PointsByPlace known(source(), piece, is_used);
   auto next = static_cast<uint32_t>(source().description().pieces[piece].points);
   MeshPoints points;
   for (size_t first = 0; first < of.middles.size(); first += kMiddlesReadAtOnce) {

@@ -21,8 +21,9 @@ namespace curvisplat {
 /// each cell, and more while they are found.
 inline constexpr uint64_t kMaxHalved = 100'000, kMaxHalvedPoints = 10 * kMaxHalved;
 
-/// Reads all cells once and the points twice, and each cell's scalar once before its first use. Samples with `blank_value` have no
-/// value. Any number of threads may read the result. Throws Error if there are more cells or points, or as reading does.
+/// Reads all cells once, the points twice or more, and each cell's scalar once before its first use. Samples with `blank_value` have no
+/// value. Any number of threads may read the result. Throws Error if there are more than kMaxHalved cells or a piece has more than
+/// kMaxHalvedPoints points, or as reading does.
 std::unique_ptr<MeshSource> halved(std::unique_ptr<MeshSource> source,
                                    std::optional<double> blank_value = std::nullopt);
 

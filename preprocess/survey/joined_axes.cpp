@@ -145,7 +145,7 @@ struct FaceLayers {
              return at > 0 && at + 1 < counts[across];
            });
   }
-  /// From node n to the next one of its row.
+  /// The way from node n to the next one of its row.
   glm::dvec3 inwardFrom(size_t n) const {
     const size_t next = isUpper() ? n - stride(axis()) : n + stride(axis());
     return {nodes.x[next] - nodes.x[n], nodes.y[next] - nodes.y[n], nodes.z[next] - nodes.z[n]};

@@ -263,7 +263,7 @@ void drawTexts(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& in
 // ------------------------------------------------------------------------------------------- markers
 
 /// Draws a dot at each point, whatever lies before it, and the text in a dark box beside it, as the window does: at its right, or at its
-/// left where the box has room there alone.
+/// left if it fits only there.
 void drawMarkers(cairo_t* cairo, const AnnotatedScene& scene) {
   constexpr glm::dvec3 kLight(1.0), kDark(0.0);
   const ScreenView& view = scene.view;

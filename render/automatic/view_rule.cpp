@@ -78,8 +78,8 @@ struct Bounds {
 class PixelSums {
  public:
   static constexpr int kMaxPixels = 80;  // along the longer side
-  static constexpr int kSamplesPerPixel =
-      47;  // about: fewer samples are seen with larger pixels, without gaps
+  /// About how many samples a pixel has: fewer samples are seen with larger pixels, without gaps.
+  static constexpr int kSamplesPerPixel = 47;
 
   /// `view`: as Camera::named() knows it. `bounds`: of the samples, of which there are some.
   PixelSums(const CoarseSamples& samples, const Bounds& bounds, std::string_view view)
@@ -171,10 +171,10 @@ double seenArea(const CoarseSamples& samples, std::string_view view, const std::
 namespace {
 
 constexpr double kUnseenPart = 0.01;  // of the extinction, beyond either side of the zoomed box
-constexpr double kZoomMargin = 1.25,
-                 kWholeMargin = 1.15;   // heights of a picture over those of what it frames
-constexpr double kWorthZooming = 0.9;   // of the whole data's picture: less is framed
-constexpr double kMinZoomed = 0.25;     // of the same: no less is framed
+// Heights of a picture over those of what it frames: of a part of the data, and of the whole.
+constexpr double kZoomMargin = 1.25, kWholeMargin = 1.15;
+constexpr double kWorthZooming = 0.9;   // zooms only to less than this share of the whole picture
+constexpr double kMinZoomed = 0.25;     // and never to less than this one
 constexpr double kWorthCropping = 0.5;  // what can be seen has less than this part of the whole data's height
 constexpr int kPlaceDigits = 4;
 // A view from below has to show much more, and another side than the first a little more.
@@ -264,8 +264,8 @@ struct FewSamples {
   }
 };
 
-/// Calls take(n, hidden), the samples nearest to a camera first. `hidden`: the area of the background that this sample hides, and none
-/// before it.
+/// Calls take(n, hidden), the samples nearest to a camera first. `hidden`: the area of the background that this sample hides and no
+/// nearer one does.
 template <typename Take>
 void walkSeen(const FewSamples& few, const Camera& camera, const Take& take) {
   constexpr int kPixels = 48;  // of the longer side: a dozen samples for each
@@ -330,8 +330,8 @@ SeenValues seenValues(const CoarseSamples& samples, const std::vector<double>& d
 namespace {
 
 /// Finds a camera that looks along -z and shows the points in perspective as large as it can. An edge of the picture is a plane through
-/// the camera; moved in parallel until it touches the points from outside, it meets z = 0 at the largest of x + slope z at the right, of
-/// slope z - x at the left. The camera is where the planes meet of two edges that face each other, or farther away.
+/// the camera; moved in parallel until it touches the points from outside, it meets z = 0 at x = max(x + slope z) at the right, and at
+/// x = -max(slope z - x) at the left. The planes of opposite edges meet in the camera; of the two pairs the farther one counts.
 class PerspectiveFit {
  public:
   /// `margin`: the picture's size over that of the points.

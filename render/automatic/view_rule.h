@@ -30,7 +30,7 @@ Silhouette widestSilhouette(const CoarseSamples& samples);
 double seenArea(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths);
 
 /// Whether a square picture from `view` shows only the small part of the data in which there is something to be seen (chooseView()).
-/// There are samples.
+/// Requires one or more samples.
 bool showsAPart(const CoarseSamples& samples, std::string_view view, const std::vector<double>& depths);
 
 /// Values of some of the samples, and the area that each hides from the eight oblique sides together; the unit does not matter.

@@ -21,6 +21,7 @@ class WindowPanels : public WindowTest {
   }
 };
 
+/// The window shows markers by signs of its own; what it saves has them, and the command draws them.
 TEST_F(WindowPanels, TheValueUnderTheMouseIsThatOfTheDataAndMarkersKeepIt) {
   open();
   const Image without = save();

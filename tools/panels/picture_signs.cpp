@@ -307,7 +307,7 @@ void drawMarkerSigns(const ViewState& state, const PlaceInWindow& place) {
     list->AddCircleFilled(centre, 0.7f * radius, line);
     const std::string text = signOf(marker, state.variable);
     const ImVec2 size = ImGui::CalcTextSize(text.c_str());
-    const float away = 1.5f * radius;
+    const float away = 1.5f * radius;  // from the dot to its text, at the left if it fits only there
     const bool at_left = centre.x + away + size.x + 3 > list->GetClipRectMax().x &&
                          centre.x - away - size.x - 3 >= list->GetClipRectMin().x;
     const ImVec2 lower(at_left ? centre.x - away - size.x : centre.x + away, centre.y - 0.5f * size.y);

@@ -311,7 +311,7 @@ class RemoteViewer::Work {
     if (!asked.view.saves) reduction_said_ = said;
     const std::string text =
         fmt::format("{}; the picture has 1/{} of them each way", tooLittle(asked.view.size), asked.reduction);
-    viewer_.send_(ServedCaches::refusalText(text, true), true);
+    viewer_.send_(ServedCaches::refusalText(text, /*reduced=*/true), true);
   }
 
   RemoteViewer& viewer_;

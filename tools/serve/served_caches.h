@@ -77,8 +77,8 @@ class ServedCaches {
 
   /// An error for a page: `text` without paths of this machine.
   std::string errorText(std::string text) const;
-  /// An error for a page, of a text that has no paths. `reduced`: a picture has fewer pixels than were asked for, and comes still: a page
-  /// that saves it waits for it.
+  /// An error for a page, of a text that has no paths. `reduced`: the picture follows with fewer pixels than were asked for; a page that
+  /// saves it goes on waiting.
   static std::string refusalText(const std::string& text, bool reduced = false);
 
  private:
