@@ -780,6 +780,7 @@ def markers(tab):
     tab.wait("document.getElementById('status').textContent === 'There is nothing at this place.'", "a click there to be answered")
     expect(tab.run(f"{PAGE}.errors.length === 0 && document.getElementById('status').className === ''"), "which is no error")
     late_click(tab, x, y)
+    slow_decoding(tab)
     expect(marker["name"] == "1" and marker["value"] == marker["value"] and len(marker["point"]) == 3, f"a marker: {marker}")
     sign_text = tab.run("document.querySelector('.sign').textContent")
     value = tab.run("document.querySelector('#markers .value').textContent")
@@ -825,6 +826,21 @@ def markers(tab):
     expect(steps == ["zip,1,2", "zip,1", "zip,1", "zip"], f"markers are undone one by one: {steps}")
     tab.run("document.querySelector('#markers button').click()")
     expect(tab.run(f"{PAGE}.state.markers.length") == 0 and not tab.run("Boolean(document.querySelector('.sign'))"), "a marker is removed")
+
+
+def slow_decoding(tab):
+    """A picture that is decoded after the next one does not take its place."""
+    tab.run("window.late = []; window.draws = onPicture; onPicture = data => { late.push(data); return draws(data); }; zoom(state.camera, 1.01); changed()")
+    rest(tab)
+    before = tab.run(f"{PAGE}.pictures")
+    tab.run("""onPicture = draws; window.decode = createImageBitmap; window.isFirst = true; createImageBitmap = async blob => {
+      if (isFirst) { isFirst = false; await new Promise(done => { window.letFirst = done; }); }
+      return decode(blob); }; onPicture(late.at(-1)); onPicture(late.at(-1)); 0""")
+    tab.wait(f"{PAGE}.pictures === {before} + 1", "the second picture")
+    tab.run("createImageBitmap = decode; letFirst(); new Promise(done => setTimeout(done, 100))")
+    expect(tab.run(f"{PAGE}.pictures") == before + 1, "the first one is left out")
+    tab.run("zoom(state.camera, 1 / 1.01); changed()")
+    rest(tab)
 
 
 def late_click(tab, x, y):
