@@ -507,14 +507,21 @@ def saves_what_it_says(browser, caches):
         tab.call("Page.navigate", url="about:blank")
 
 
+def resize(tab, width, height, ratio=1, **more):
+    """Gives the page another size, and waits for the final picture of that size."""
+    tab.resize(width, height, ratio, **more)
+    tab.wait(f"""window.innerWidth === {width} && (() => {{ const r = document.getElementById('stage').getBoundingClientRect();
+      return Math.abs(r.width * {ratio} - {PAGE}.header.width) <= 1 && Math.abs(r.height * {ratio} - {PAGE}.header.height) <= 1; }})()""",
+             f"the picture of a page of {width}x{height}")
+    rest(tab)
+
+
 def sizes(tab):
     rest(tab)
     first = tab.run(f"{PAGE}.state.camera.parallel_scale")
     widths = []
     for width, height, ratio in ((640, 480, 1), (390, 844, 2), (1920, 1080, RATIO), (1280, 800, RATIO)):
-        tab.resize(width, height, ratio)
-        time.sleep(0.3)
-        rest(tab)
+        resize(tab, width, height, ratio)
         shot(tab, f"size_{width}")
         expect(tab.run("getComputedStyle(document.getElementById('picture')).objectFit") == "contain", "a picture before is not stretched")
         stage = tab.run("(() => { const r = document.getElementById('stage').getBoundingClientRect(); return [r.width, r.height]; })()")
@@ -526,9 +533,7 @@ def sizes(tab):
         expect(max(widths) < 1.2 * min(widths), f"the data keep their width: {widths}, of a shape of {usual}")
     expect(abs(tab.run(f"{PAGE}.state.camera.parallel_scale") / first - 1) < 0.1, f"and come back as they were: {first}, {widths}")
     # A phone: one finger rotates, two zoom and move.
-    tab.resize(390, 844, 2, mobile=True)
-    time.sleep(0.3)
-    rest(tab)
+    resize(tab, 390, 844, 2, mobile=True)
     camera = tab.run(f"{PAGE}.state.camera")
     tab.touch("touchStart", (100, 150))
     for n in range(10):
@@ -544,7 +549,7 @@ def sizes(tab):
     rest(tab)
     shot(tab, "phone")
     expect(tab.run(f"{PAGE}.state.camera.parallel_scale") < 0.9 * turned["parallel_scale"], "two fingers zoom")
-    tab.resize(1280, 800, RATIO)
+    resize(tab, 1280, 800, RATIO)
 
 
 def undo_after_resizing(tab):
@@ -554,9 +559,7 @@ def undo_after_resizing(tab):
     steps = tab.run("[statesAtRest.length, stateAtRest]")
     outline = tab.run(f"{PAGE}.state.outline")
     changes(tab, lambda: tab.click("#outline"), "the outline")
-    tab.resize(390, 844, 2)
-    tab.wait(f"{PAGE}.header.width === 780", "the narrow picture")
-    rest(tab)
+    resize(tab, 390, 844, 2)
     expect(tab.run("[statesAtRest.length, stateAtRest]") == [steps[1] + 2, steps[1] + 1], f"resizing adds no step to undo: {steps}")
     narrow = tab.run(f"{PAGE}.state.camera.parallel_scale")
     expect(narrow > 1.2 * camera["parallel_scale"], "the narrow picture's view is further away")
@@ -564,9 +567,7 @@ def undo_after_resizing(tab):
     rest(tab)
     expect(tab.run(f"{PAGE}.state.outline") == outline, "Ctrl+Z undoes the outline")
     expect(abs(tab.run(f"{PAGE}.state.camera.parallel_scale") / narrow - 1) < 0.01, "in the view of the narrow picture")
-    tab.resize(1280, 800, RATIO)
-    tab.wait(f"{PAGE}.header.width > 780 * {RATIO}", "the wide picture")
-    rest(tab)
+    resize(tab, 1280, 800, RATIO)
     back = tab.run(f"{PAGE}.state.camera")
     expect(max(abs(a - b) for a, b in zip(back["position"], camera["position"])) < 0.01 * max(map(abs, camera["position"])), "and the view comes back")
 
