@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/cut_source.h"
+#include "preprocess/gather/halved_mesh.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/error.h"
@@ -56,10 +57,23 @@ inline void readMesh(const MeshSource& source) {
   }
 }
 
-/// Reads a grid, or a mesh whose curved cells are cut.
+/// The same of a small mesh in halves.
+inline void readHalves(std::unique_ptr<MeshSource> mesh) {
+  constexpr uint64_t kMax = 4096;
+  for (const MeshPiece& piece : mesh->description().pieces)
+    if (piece.points > kMax || piece.cells > kMax) return;
+  isHalvedByNeed(*mesh);
+  readMesh(*halved(std::move(mesh)));
+}
+
+/// Reads a grid, or a mesh whose curved cells are cut; and this again in halves.
 inline void readData(std::unique_ptr<DataSource> source) {
   source = cutCurved(std::move(source), true, fuzzFolder());
-  if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get())) return readMesh(*mesh);
+  if (auto* const mesh = dynamic_cast<MeshSource*>(source.get())) {
+    readMesh(*mesh);
+    source.release();
+    return readHalves(std::unique_ptr<MeshSource>(mesh));
+  }
   readGrid(dynamic_cast<const GridSource&>(*source));
 }
 
