@@ -95,9 +95,9 @@ class SplatOrigin {
   /// Bytes of all temporary files together, and of those that are counted beside them, at the moment when they were the most.
   virtual uint64_t temporaryBytes() const { return 0; }
 
-  /// Whether ranks make the splats together, each with an origin of the same files. Then all of them call the functions below: survey() returns the whole's result, count() and
-  /// scatter() count and make the splats of a share, and finish() brings those that had to wait to rank 0, whose
-  /// sink gets them. If not, rank 0 alone calls them.
+  /// Whether ranks make the splats together, each with an origin of the same files. Then all of them call the functions below: survey()
+  /// returns the whole's result, count() and scatter() count and make the splats of a share, and finish() brings those that had to wait to
+  /// rank 0, whose sink gets them. If not, rank 0 alone calls them.
   virtual bool isShared() const { return false; }
 
   /// Throws Error if there is nothing to draw.

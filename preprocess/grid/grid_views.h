@@ -42,8 +42,8 @@ std::vector<uint32_t> orderByName(const std::vector<GridBlock>& blocks,
 std::unique_ptr<GridSource> reordered(const GridSource& source, std::vector<uint32_t> order);
 
 /// The same field on smaller cells: each cell of `source` is cut into parts by its own trilinear map (the
-/// result is `source` itself if that is one everywhere); a direction with one plane of nodes keeps it. A splat has one place, shape and plane for all of its cell, so a few cells that grow or bend
-/// steeply show as bands; small parts of them do not.
+/// result is `source` itself if that is one everywhere); a direction with one plane of nodes keeps it. A splat has one place, shape and
+/// plane for all of its cell, so a few cells that grow or bend steeply show as bands; small parts of them do not.
 ///
 /// The grid's own nodes keep their coordinates, values and blanking. New nodes are interpolated, also in
 /// derived scalars of `source`. Blocks that share the nodes of a face or an edge share the new ones there

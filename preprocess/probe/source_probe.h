@@ -37,8 +37,8 @@ struct ValueRange {
 };
 
 /// Returns for each point the values of the cell that has it: the first that is found around the samples in `near`, in their order;
-/// nullopt if there is none. `scalars`: indices into the description. Reads boxes around the samples, and for points that have no cell there
-/// the outermost cells of the blocks. Throws Error as reading does.
+/// nullopt if there is none. `scalars`: indices into the description. Reads boxes around the samples, and for points that have no cell
+/// there the outermost cells of the blocks. Throws Error as reading does.
 std::vector<std::optional<SourceValues>> probeGrid(const GridSource& source,
                                                    std::span<const uint32_t> scalars,
                                                    std::span<const ValueRange> ranges,

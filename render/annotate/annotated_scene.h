@@ -69,8 +69,8 @@ struct AxisTick {
   std::string label;
 };
 
-/// Chooses about `wanted` (2 or more) ticks, on a linear scale at least two, in the axis' range, at multiples of 1, 2 or 5 times a power of ten.
-/// On a logarithmic scale they are at powers of ten, with 2 and 5 times them if there are few; on that of asinh at
+/// Chooses about `wanted` (2 or more) ticks, on a linear scale at least two, in the axis' range, at multiples of 1, 2 or 5 times a power
+/// of ten. On a logarithmic scale they are at powers of ten, with 2 and 5 times them if there are few; on that of asinh at
 /// the roundest numbers that have room. All labels of a linear scale have the same number of decimals. If both ends
 /// are equal there is one tick. Requires finite ends that do not decrease, and above zero on a logarithmic scale.
 std::vector<AxisTick> axisTicks(const ScalarAxis& axis, int wanted);

@@ -36,8 +36,8 @@ struct AskedDifferences {
   bool operator==(const AskedDifferences&) const = default;
 };
 
-/// Returns a warning if an axis has fewer than 100 steps of the stored values, or fewer than 20 within the width around the centre of an asinh, or
-/// in the first decade of a logarithm; empty otherwise.
+/// Returns a warning if an axis has fewer than 100 steps of the stored values, or fewer than 20 within the width around the centre of an
+/// asinh, or in the first decade of a logarithm; empty otherwise.
 std::string axisFinerThanStored(const CacheReader& cache, const ShownAxis& shown);
 
 /// Returns what axisFinerThanStored() says of the axes, for each scalar once, and a warning for each isovalue from which more than 2 % of

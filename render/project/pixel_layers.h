@@ -57,7 +57,8 @@ class PixelLayers {
     void endPixel(size_t first_layer);
   };
 
-  /// `rows`: from the top, each whole or in pieces from the left. Parallel on the caller's TBB arena. `depth_origin`: orthographic, the distance along the view at which depths begin.
+  /// `rows`: from the top, each whole or in pieces from the left. Parallel on the caller's TBB arena. `depth_origin`: orthographic, the
+  /// distance along the view at which depths begin.
   PixelLayers(ImageSize size, std::vector<Row> rows, double depth_origin);
 
   ImageSize size() const { return size_; }

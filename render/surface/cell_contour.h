@@ -1,7 +1,8 @@
 // The isosurface of a grid's nodes (grid_nodes.h) as triangles, cell by cell: with a vertex wherever an edge of a cell crosses the value.
 //
 // A face on which the value crosses all four edges cuts off the corners at or above the value one by one, so both of its cells have the
-// same lines there: the surface has no holes within a block. Cells with a blanked corner are left out. Each edge has one vertex, which all cells around it share. One thread; pure.
+// same lines there: the surface has no holes within a block. Cells with a blanked corner are left out. Each edge has one vertex, which all
+// cells around it share. One thread; pure.
 #pragma once
 
 #include <cstdint>

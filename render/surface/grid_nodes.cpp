@@ -13,7 +13,8 @@
 namespace curvisplat {
 namespace {
 
-// The numbers by which nodes become splats (preprocess/splats/node_splats.h): half the kernel's variance, and how far a bent row counts, in cells.
+// The numbers by which nodes become splats (preprocess/splats/node_splats.h): half the kernel's variance, and how far a bent row counts,
+// in cells.
 constexpr double kBend = 0.5 * kKernelSigma * kKernelSigma, kMaxBend = 4;
 constexpr int kUnbendSteps = 3;
 

@@ -7,11 +7,13 @@
 // slope, and the correction by a few steps of a fixed point. What is left is second order: where the place is a part of a cell off, the
 // value is the one there.
 //
-// Blanked nodes are those that neither have a splat nor share one. Beside them cells are half ones, as at borders, and lack octants in cells
-// with a blanked corner: a splat sits in the middle of what is left. So leaves of such grids are read twice: first for what is blanked.
+// Blanked nodes are those that neither have a splat nor share one. Beside them cells are half ones, as at borders, and lack octants in
+// cells with a blanked corner: a splat sits in the middle of what is left. So leaves of such grids are read twice: first for what is
+// blanked.
 //
 // All nodes of the grid are kept, block by block, i fastest: 16 bytes a node, with a second scalar 20, with blanked ones one more; 12 more
-// while they are made, and with blanked ones 48 more for each of the largest block. One thread makes them, from leaves that it reads one after the other; immutable then.
+// while they are made, and with blanked ones 48 more for each of the largest block. One thread makes them, from leaves that it reads one
+// after the other; immutable then.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // The isosurfaces of a scene by scalar: what each group's other colours and opacities are of. A picture has a scalar of its opacities and
-// perhaps another one of its colours; isosurfaces are of either, or of any further scalar of the cache. All have the picture's colours where
-// they lie; those of the scalar that the colours are of have that of their value.
+// perhaps another one of its colours; isosurfaces are of either, or of any further scalar of the cache. All have the picture's colours
+// where they lie; those of the scalar that the colours are of have that of their value.
 #pragma once
 
 #include <cstddef>

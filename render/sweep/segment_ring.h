@@ -7,8 +7,8 @@
 //   worker n     acquire(sequence, count) -> fill -> commit(sequence)
 //   painter      next() -> draw -> release()
 //
-// The painter draws from where the workers write. close() wakes all waiting threads; after it nothing is granted or handed out. SegmentDrawer is the
-// painter's side, on its thread.
+// The painter draws from where the workers write. close() wakes all waiting threads; after it nothing is granted or handed out.
+// SegmentDrawer is the painter's side, on its thread.
 #pragma once
 
 #include <cstddef>

@@ -7,7 +7,8 @@
 //
 // The histogram's bins divide the range evenly, which says nothing where a long tail stretches it. Percentiles come
 // from bins that follow a sample of the values (HistogramBins): each has about 1/4096 of the volume, which is then counted exactly.
-// A mean that was rounded counts for all bins of values that it may have been, by the sample. So a percentile's rank is wrong by a bin's share at most, and one between two of the 1001 that are stored by 0.1 %.
+// A mean that was rounded counts for all bins of values that it may have been, by the sample. So a percentile's rank is wrong by a bin's
+// share at most, and one between two of the 1001 that are stored by 0.1 %.
 //
 // It depends on the decoded splats alone: not on threads, memory or ranks, nor on whether the values were
 // converted with the geometry, added later or resumed. So sums are of integers, which no order changes. Any
@@ -101,8 +102,8 @@ std::optional<ValueHistogram> stepHistogram(const CacheReader& cache, size_t var
 
 /// How the values of all steps of a series are spread: the sum of the steps' histograms over the range of
 /// the series, each with its volume, and their percentiles as of one step, if all have some. The volume of a
-/// step's bin is divided evenly among the bins that it overlaps; `volume` is the mean of the steps'. nullopt if a step has no histogram. Opens one file of each
-/// step and reads 6 KiB of it. Throws Error if one is damaged.
+/// step's bin is divided evenly among the bins that it overlaps; `volume` is the mean of the steps'. nullopt if a step has no histogram.
+/// Opens one file of each step and reads 6 KiB of it. Throws Error if one is damaged.
 std::optional<ValueHistogram> seriesHistogram(const CacheReader& cache, size_t variable);
 
 /// The sums of the variables' histograms while a cache is written. Any thread.

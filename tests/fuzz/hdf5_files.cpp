@@ -1,5 +1,5 @@
-// VTKHDF and Fluent: HDF5 files that HDF5 itself writes, whole and sound, with objects of any name, type and extent. Damaged structures of HDF5
-// are tried in a process of their own (library_trial.h), and by tests of the whole program.
+// VTKHDF and Fluent: HDF5 files that HDF5 itself writes, whole and sound, with objects of any name, type and extent. Damaged structures of
+// HDF5 are tried in a process of their own (library_trial.h), and by tests of the whole program.
 #include <hdf5.h>
 
 #include <algorithm>

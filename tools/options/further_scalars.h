@@ -19,8 +19,8 @@ struct FurtherScalar {
 std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
                                             const std::vector<std::filesystem::path>& files);
 
-/// Adds the scalar to the cache; a series is converted again for that, and so is a cache of which some samples have no value of it: the scalar
-/// is then kept apart (Manifest::own_blanks). Throws Error as furtherScalarsOf() and addScalars()
+/// Adds the scalar to the cache; a series is converted again for that, and so is a cache of which some samples have no value of it: the
+/// scalar is then kept apart (Manifest::own_blanks). Throws Error as furtherScalarsOf() and addScalars()
 /// do, Interrupted once `progress` is stopped; then the cache is as it was.
 void addFurtherScalar(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
                       const std::string& name, Progress& progress);

@@ -252,8 +252,8 @@ class StampedFiles {
   const std::vector<std::string>& timesLeftOut() const { return times_left_out_; }
 
  private:
-  /// Adds `file`: of a folder all files (of a case of OpenFOAM those that are read); and those that a small text names. At each depth a file is looked at once: a text
-  /// may name another one, which does the same, thousands of times.
+  /// Adds `file`: of a folder all files (of a case of OpenFOAM those that are read); and those that a small text names. At each depth a
+  /// file is looked at once: a text may name another one, which does the same, thousands of times.
   void add(const fs::path& file, int depth) {
     progress_.throwIfStopped();
     std::error_code error;

@@ -122,8 +122,8 @@ struct AnnotationArguments {
   void fill(const TextFields& fields, AnnotatedScene& scene) const;
 };
 
-/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles, --outline, --marker, --title, --label and --text-size under the
-/// heading `group`.
+/// Adds --scalar-bar, --scalar-bar-title, --axes, --axes-grid, --axes-titles, --outline, --marker, --title, --label and --text-size under
+/// the heading `group`.
 void addAnnotationOptions(CLI::App& command, AnnotationArguments& arguments, const std::string& group);
 
 /// Throws UsageError if options contradict each other.

@@ -66,8 +66,8 @@ void heading(const char* text);
 class Section {
  public:
   Section(const char* text, bool open_at_first);
-  /// A section with a list, which is folded at first, and whose heading counts the entries. It unfolds if the list has grown, by the menu or by a
-  /// saved view, and is then scrolled to if it would lie below the window's end. `seen`: how many entries
+  /// A section with a list, which is folded at first, and whose heading counts the entries. It unfolds if the list has grown, by the menu
+  /// or by a saved view, and is then scrolled to if it would lie below the window's end. `seen`: how many entries
   /// there were in the frame before; nullopt before the first frame.
   Section(const char* text, std::optional<size_t>& seen, size_t number);
   ~Section();
@@ -79,8 +79,8 @@ class Section {
  private:
   bool open_;
 };
-/// Draws the scalars that the sources have besides, at the end of a list of scalars. `wanted`: what one that is chosen is for; `prefix`: of the
-/// names of widgets.
+/// Draws the scalars that the sources have besides, at the end of a list of scalars. `wanted`: what one that is chosen is for; `prefix`:
+/// of the names of widgets.
 void drawFurther(const FurtherScalars& further, const WantedScalar& wanted, const std::string& prefix,
                  PanelActions& actions);
 /// Dear ImGui's BeginCombo(). A text that is too long for it ends with an ellipsis, and is in its hint. `what`: the rest of the hint.

@@ -61,7 +61,8 @@ class ServedCaches {
   };
   std::string markerText(size_t cache, const MarkedScalar& scalar,
                          const std::optional<glm::dvec3>& point) const;
-  /// Warnings where a view asks for finer differences than the cache stores at the step: finerThanStored(). `number`: of the view's request.
+  /// Warnings where a view asks for finer differences than the cache stores at the step: finerThanStored(). `number`: of the view's
+  /// request.
   struct AskedStep {
     size_t cache = 0;
     uint64_t step = 0;

@@ -104,8 +104,8 @@ class CacheView {
   bool isDark() const { return state_.dark; }
   const std::optional<Preview>& preview() const { return preview_; }
   const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }
-  /// A scalar that the cache lacks, once: one that hasElsewhere(), or one of the sources, to be added. `is_busy`: something is being opened or added; then it
-  /// waits.
+  /// A scalar that the cache lacks, once: one that hasElsewhere(), or one of the sources, to be added. `is_busy`: something is being
+  /// opened or added; then it waits.
   std::optional<WantedScalar> takeWantedScalar(bool is_busy);
   /// The name of the scalar that is shown.
   const std::string& scalar() const { return state_.variable; }

@@ -1,7 +1,7 @@
 // One or more NetCDF files that describe one grid: coordinates and masks in one, fields in others.
 // NetcdfFiles offers their variables and dimensions as those of one file; a dimension of which the user has
-// chosen one value has the length 1, and parts of a map are one file (netcdf_tiles.h). foreignNetcdf() names files that hold no structured grid by design. Any
-// number of threads may use a NetcdfFiles; calls into libnetcdf run one after the other.
+// chosen one value has the length 1, and parts of a map are one file (netcdf_tiles.h). foreignNetcdf() names files that hold no structured
+// grid by design. Any number of threads may use a NetcdfFiles; calls into libnetcdf run one after the other.
 #pragma once
 
 #include <cstddef>

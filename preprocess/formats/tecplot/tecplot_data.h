@@ -46,8 +46,8 @@ void readTecplotValues(const TecplotValues& values, uint64_t first, std::span<Va
 extern template void readTecplotValues(const TecplotValues&, uint64_t, std::span<float>);
 extern template void readTecplotValues(const TecplotValues&, uint64_t, std::span<double>);
 
-/// The faces of polyhedra, or the lines of polygons, which have two corners: of each the number of its corners, or in binary files where they begin; its corners; and the elements on its
-/// two sides.
+/// The faces of polyhedra, or the lines of polygons, which have two corners: of each the number of its corners, or in binary files where
+/// they begin; its corners; and the elements on its two sides.
 struct TecplotFaces {
   uint64_t count = 0, corner_count = 0;
   uint64_t connected = 0, connections = 0;  // of faces with elements of other zones
