@@ -104,7 +104,7 @@ class BrickStore {
   virtual uint64_t defaultBytes() const = 0;
   virtual bool has(uint32_t brick) const = 0;
   /// Adds the brick of a part: its geometry if that is missing, and its values at the step. Bricks that no part of the last makeRoom()
-  /// needs may be evicted for it. If there is no free range for it all the same, the brick is not stored, which has() tells; the next
+  /// needs may be evicted for it. Where no free range is long enough even then, the brick is not stored and has() stays false; the next
   /// makeRoom() empties the store.
   virtual void put(const StoredPart& part, const GeometryArrays<const float>& geometry,
                    const BrickValues& values, const BrickPieces& pieces) = 0;

@@ -57,7 +57,7 @@ inline void readMesh(const MeshSource& source) {
   }
 }
 
-/// The same of a small mesh in halves.
+/// Halves the cells of a small mesh, and reads what they become. Large ones are passed over.
 inline void readHalves(std::unique_ptr<MeshSource> mesh) {
   constexpr uint64_t kMax = 4096;
   for (const MeshPiece& piece : mesh->description().pieces)
