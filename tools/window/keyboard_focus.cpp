@@ -74,8 +74,10 @@ std::vector<KeyboardFocus::Stop> KeyboardFocus::stopsInFront() const {
   for (const Stop& stop : stops_before_)
     if (!is_covered || (popup() && isIn(stop.window, popup()))) stops.push_back(stop);
   if (!is_covered)
-    std::ranges::stable_partition(
-        stops, [](const Stop& stop) { return (stop.window->Flags & ImGuiWindowFlags_MenuBar) == 0; });
+    // Clang 14 does not compile the ranges' form with GCC 12's library.
+    std::stable_partition(stops.begin(), stops.end(), [](const Stop& stop) {
+      return (stop.window->Flags & ImGuiWindowFlags_MenuBar) == 0;
+    });
   return stops;
 }
 
