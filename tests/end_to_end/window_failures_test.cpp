@@ -85,11 +85,17 @@ TEST_F(NoWindow, OfACacheThatIsDamaged) {
   fs::remove_all("damaged.splats");
 }
 
-TEST_F(NoWindow, FromAStateFileThatIsWrong) {
+TEST_F(NoWindow, FromOptionsThatTheCacheRefuses) {
   std::ofstream("state.json") << "{\"curvisplat_view\": 1}";
-  expectFailure(runProgram({"view", "a.splats", "--state", "state.json"}),
-                {"state.json: variable is missing"});
-  expectFailure(runProgram({"view", "a.splats", "--state", "none.json"}), {"none.json"});
+  const std::vector<std::pair<Words, const char*>> refused{
+      {{"--state", "state.json"}, "state.json: variable is missing"},
+      {{"--state", "none.json"}, "none.json"},
+      {{"--scalar", "none"}, "no scalar 'none'"}};
+  for (const auto& [options, text] : refused) {
+    const ProgramResult result = runProgram(Words{"view", "a.splats"} + options);
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;  // not even "window: OpenGL"
+    expectFailure(result, {text});
+  }
 }
 
 /// A cache of its own: what the window reads for its second scalar was not read before.

@@ -127,6 +127,18 @@ void checkGridOptions(const ViewArguments& arguments) {
         arguments.files.front().string());
 }
 
+/// Refuses a state or a scalar that cannot be shown, before a window opens. Throws Error, and UsageError for the scalar.
+void checkStart(const ViewerOptions& options, const CacheReader* cache) {
+  if (options.state) {
+    const std::string text = readTextFile(*options.state);
+    if (cache)
+      viewStateFromJson(text, *options.state, cache->manifest());
+    else
+      scalarOfViewState(text, *options.state);
+  }
+  if (options.scalar && cache) cache->variableNamed(*options.scalar);
+}
+
 std::string whatOf(const KeptPreview& preview) {
   constexpr std::array<const char*, 4> kEndings{"th", "st", "nd", "rd"};
   const uint64_t last = preview.stride % 10, tens = preview.stride / 10 % 10;
@@ -229,6 +241,7 @@ void view(const ViewArguments& arguments) {
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {
+    checkStart(options, cache ? &*cache : nullptr);
     runViewer(std::move(cache), options, progress);
   } catch (const UsageError& error) {
     throw Error("{}", error.what());  // the cache decides, not the usage
