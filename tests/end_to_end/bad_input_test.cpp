@@ -223,6 +223,8 @@ TEST_F(BadInput, MessagesSayWhatToDo) {
   writeFileAtomically(file("case/a.foam"), std::string());
   const std::pair<Words, const char*> wrong_usage[] = {
       {{"serve", cache, "--port", "99999"}, "--port '99999': expected a number from 0 to 65535"},
+      {{"serve", cache, "--viewer-memory", "1M"},
+       "--viewer-memory 1M: no picture fits into this; give 32M or more"},
       {{"info", cache, "--source"}, "--source: is read at points; add --probe X,Y,Z or --probe-line"},
       {{"info", cache, "--probe", "no.csv"},
        "--probe no.csv: there is no such file; expected a point x,y,z, or a file"},

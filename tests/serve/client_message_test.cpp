@@ -107,6 +107,8 @@ TEST(Access, TokenFilesAreTheirOwnersAlone) {
   write("0123456789abcdef&x=1\n", 0600);
   EXPECT_THROW(readToken(file), Error);
   EXPECT_THROW(readToken(folder.path() / "none"), Error);
+  expectError([&] { readToken("/dev/null"); },
+              {"/dev/null", "not a regular file"});  // not "run chmod 600 on it"
 }
 
 template <typename T>
