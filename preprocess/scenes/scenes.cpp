@@ -322,7 +322,7 @@ std::vector<std::string> sceneNames() {
 std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
                                                      std::optional<double> clustering) {
   if (clustering && !(*clustering > 0 && *clustering <= 20))
-    throw UsageError("clustering {} is out of range; expected above 0, at most 20", *clustering);
+    throw UsageError("--clustering {} is out of range; expected above 0, at most 20", *clustering);
   const auto pipe = [&](double turns, double inner, double own_clustering, Pipe::Field field) {
     return std::vector<std::shared_ptr<const Scene>>{std::make_shared<Pipe>(
         std::string(name), PipeShape{turns, inner, clustering.value_or(own_clustering)}, field)};

@@ -240,7 +240,7 @@ TEST_F(Resume, TakesNodesThatAllCoincide) {
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
   for (int64_t call = calls - kCallsToFinish - 18; call < calls - kCallsToFinish - 2;
-       call += faults::isWholeSweep() ? 1 : 9) {
+       call += faults::isWholeSweep() ? 1 : 5) {
     SCOPED_TRACE(call);
     killedAt(call);
     most = std::max(most, readBrickLog(partial(), 1).size());

@@ -49,11 +49,11 @@ SheetOpacity parseSheetOpacity(const std::string& option, const std::string& tex
   constexpr std::string_view kFunction = "function";
   SheetOpacity opacity;
   opacity.by_function = text.starts_with(kFunction);
-  std::string factor = opacity.by_function ? text.substr(kFunction.size()) : text;
+  const std::string factor = opacity.by_function ? text.substr(kFunction.size()) : text;
   if (opacity.by_function && factor.empty()) return opacity;
-  if (opacity.by_function && factor.front() == '*') factor.erase(0, 1);
-  opacity.factor = parseNumber(option, factor);
-  if (!(opacity.factor > 0 && opacity.factor <= 1))
+  const bool has_form = !opacity.by_function || (factor.starts_with('*') && factor.size() > 1);
+  if (has_form) opacity.factor = parseNumber(option, opacity.by_function ? factor.substr(1) : factor);
+  if (!has_form || !(opacity.factor > 0 && opacity.factor <= 1))
     throw UsageError("{} {}: expected a number above 0 and at most 1, or function, or function*NUMBER",
                      option, text);
   return opacity;
