@@ -28,7 +28,7 @@ struct Quad {
 /// have numbers of their own.
 Quad quadOf(uint64_t cell, uint64_t corner, const glm::dvec3& first, const glm::dvec3& second) {
   const std::array<glm::dvec3, 4> at{glm::dvec3(0), first, first + second, second};
-  const uint64_t others = 1000 + 4 * cell;
+  const uint64_t others = 1'000'000 + 4 * cell;
   Quad quad{{corner, others, others + 1, others + 2}, {cell, {}, 0.5 * (first + second)}};
   quad.face.half_axes = HangingFaces::halfAxes(at, glm::cross(first, second));
   return quad;
@@ -56,7 +56,9 @@ TEST(HangingFaces, AreFoundInAllDirections) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   const auto direction = [&] {
-    return glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+    const double x = normal(random), y = normal(random),
+                 z = normal(random);  // compilers order arguments differently
+    return glm::normalize(glm::dvec3(x, y, z));
   };
   std::vector<Quad> quads;
   Pairs expected;
