@@ -252,6 +252,7 @@ size_t TileQueues::workOf(size_t number, size_t entries, bool last) const {
 bool TileQueues::divide(size_t number) {
   if (!divides_ || chunks_ * kChunk < kMinToDivide) return false;
   const Queue& divided = queues_[number];
+  if (divided.order_tiles == 0) return false;
   const Square all = Square::of(divided.order_tiles);
   if (all.side <= kMinPart || queues_.size() + kParts > max_queues_) return false;
   const size_t needed = chunksToMove(divided);

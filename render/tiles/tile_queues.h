@@ -64,8 +64,8 @@ class TileQueues {
   /// The order tiles of a queue: none if it was divided.
   OrderTileMask orderTilesIn(size_t queue) const { return queues_[queue].order_tiles; }
   /// Divides a queue into those of four quarters, which are the last four from then on. Returns false, and changes
-  /// nothing, if it is not larger than kMinPart, if there are too many parts, if there is little memory left for what
-  /// waits, or if once there was too little. No other thread may use any queue meanwhile.
+  /// nothing, if it was divided before, if it is not larger than kMinPart, if there are too many parts, if there is
+  /// little memory left for what waits, or if once there was too little. No other thread may use any queue meanwhile.
   bool divide(size_t number);
   /// Moves what waits in a queue that was divided to its parts, from `first_part` on, before they are used. Different
   /// queues on any threads.

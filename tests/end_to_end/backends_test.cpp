@@ -28,7 +28,8 @@ struct BackendScene {
 
 /// Returns what EGL draws with here, or why it does not.
 std::string eglOf(const ProgramResult& system) {
-  for (const auto& backend : nlohmann::json::parse(system.out).at("backends"))
+  const auto report = nlohmann::json::parse(system.out);
+  for (const auto& backend : report.at("backends"))
     if (backend.at("name") == "egl") return backend.at("found").get<std::string>();
   return {};
 }
