@@ -38,7 +38,7 @@ struct ServeArguments {
   std::optional<std::string> frame_time;
 };
 
-constexpr uint64_t kLeastViewerMemory = 32 << 20;  // less than any picture needs (FrameBudget)
+constexpr uint64_t kMinViewerMemory = 32 << 20;  // less than any picture needs (FrameBudget)
 constexpr size_t kLargeBlock = size_t{1} << 20;    // goes back to the system as soon as it is freed
 
 ServerOptions optionsFrom(const ServeArguments& arguments) {
@@ -47,7 +47,7 @@ ServerOptions optionsFrom(const ServeArguments& arguments) {
   options.port = arguments.port;
   options.host_names = arguments.hosts;
   options.each.memory_bytes = parseByteSize("--viewer-memory", arguments.viewer_memory);
-  if (options.each.memory_bytes < kLeastViewerMemory)
+  if (options.each.memory_bytes < kMinViewerMemory)
     throw UsageError("--viewer-memory {}: no picture fits into this; give 32M or more",
                      arguments.viewer_memory);
   options.each.backend = parseBackend(arguments.backend);
