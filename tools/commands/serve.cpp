@@ -39,7 +39,7 @@ struct ServeArguments {
 };
 
 constexpr uint64_t kMinViewerMemory = 32 << 20;  // less than any picture needs (FrameBudget)
-constexpr size_t kLargeBlock = size_t{1} << 20;    // goes back to the system as soon as it is freed
+constexpr size_t kLargeBlock = size_t{1} << 20;  // goes back to the system as soon as it is freed
 
 ServerOptions optionsFrom(const ServeArguments& arguments) {
   ServerOptions options;

@@ -50,10 +50,8 @@ std::string newToken() {
 
 std::string readToken(const std::filesystem::path& path) {
   struct stat status {};
-  const bool is_there = ::stat(path.c_str(), &status) == 0;
-  if (is_there && !S_ISREG(status.st_mode))
-    throw Error("{}: is not a regular file (expected a file with the token)", path.string());
-  if (is_there && (status.st_mode & (S_IRWXG | S_IRWXO)) != 0)
+  const bool is_file = ::stat(path.c_str(), &status) == 0 && S_ISREG(status.st_mode);
+  if (is_file && (status.st_mode & (S_IRWXG | S_IRWXO)) != 0)
     throw Error("{}: others may read the token (found mode {:03o}, expected 600); run chmod 600 on it",
                 path.string(), status.st_mode & 0777u);
   std::string token = readTextFile(path);
