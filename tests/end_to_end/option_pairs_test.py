@@ -51,8 +51,8 @@ EDGES = {  # values at the edges of what an option takes, by its name
     "--part": ["1/1", "0/2", "3/2", "1/0", "1/99999999999", "-1/2", "1", "/", "1/4294967296"], "--memory": MEMORY, "--card-memory": MEMORY,
     "--viewer-memory": MEMORY, "--threads": COUNTS, "--refine": ["1", "4", "auto", "0", "9", "1000000", "nan", "4294967297"], "--step": COUNTS,
     "--tmp": [".", "/nonexistent", "g.xyz", "/proc"], "--time-step": COUNTS, "--select": ["month=3", "=", "a=", "=3", "month=nan"], "--until": COUNTS,
-    "--probe": [*VECTORS, "g.xyz", "/dev/null"], "--voxels": [*COUNTS, "100000"], "--channels": ["depth,depth", "none,depth", ",", "rgb"], "--port": COUNTS, "--listen": ADDRESSES,
-    "--host": ["example.org", "*", "a b", "x:80", "\u00e9"], "--token-file": ["g.xyz", ".", "/dev/null", "/dev/zero", "/etc/passwd"],
+    "--probe": [*VECTORS, "g.xyz", "/dev/null"], "--voxels": [*COUNTS, "100000"], "--channels": ["depth,depth", "none,depth", ",", "rgb"], "--port": COUNTS,
+    "--listen": ADDRESSES, "--host": ["example.org", "*", "a b", "x:80", "\u00e9"], "--token-file": ["g.xyz", ".", "/dev/null", "/dev/zero", "/etc/passwd"],
     "--backend": ["cpu", "osmesa", "egl", "egl-quads"], "--frame-time": NUMBERS}
 LEFT_OUT = {"--help", "--help-all", "--version", "--follow", "--output", "-o"}
 TO_FILES = {"--stats", "--trace", "--write-tf", "--json", "--plot"}  # write what their values name

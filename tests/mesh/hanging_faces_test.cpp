@@ -56,8 +56,8 @@ TEST(HangingFaces, AreFoundInAllDirections) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   const auto direction = [&] {
-    const double x = normal(random), y = normal(random),
-                 z = normal(random);  // compilers order arguments differently
+    // One after the other: compilers evaluate arguments in different orders.
+    const double x = normal(random), y = normal(random), z = normal(random);
     return glm::normalize(glm::dvec3(x, y, z));
   };
   std::vector<Quad> quads;
