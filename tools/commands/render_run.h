@@ -17,6 +17,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/manifest.h"
 #include "tools/commands/render_statistics.h"
+#include "tools/options/annotation_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_sequence.h"
 #include "tools/options/opacity_arguments.h"

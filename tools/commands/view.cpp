@@ -22,6 +22,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/grid_faces.h"
+#include "tools/options/annotation_arguments.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/example_grid.h"
 #include "tools/options/frame_sequence.h"

@@ -19,6 +19,7 @@
 
 #include "render/frame/frame.h"
 #include "stream/cache/cache_reader.h"
+#include "tools/options/annotation_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_sequence.h"
 #include "tools/options/opacity_arguments.h"
