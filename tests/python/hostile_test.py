@@ -160,6 +160,18 @@ class HostileTest(unittest.TestCase):
                 expect(curvisplat.Error, "", attempt)
             """)
 
+    def test_paths_that_are_no_text(self):
+        self.attempt("""
+            x, y, z, s = grid()
+            name = b"o\\xff.splats"
+            curvisplat.convert_arrays(name, Block(x, y, z, {"s": s}))
+            cache = curvisplat.open(name)
+            assert os.fsencode(cache.path) == name, cache.path
+            expect(curvisplat.Error, "o\\\\xff.splats: the cache has no scalar 'none'", lambda: cache.render("none"))
+            expect(curvisplat.Error, "none\\\\xff: does not exist", lambda: curvisplat.open(b"none\\xff"))
+            shutil.rmtree(name)
+            """)
+
     def test_functions_that_answer_nonsense(self):
         self.attempt("""
             read = reader()

@@ -14,6 +14,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -48,6 +49,23 @@ glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
 }
 
+/// A message, which may have a file's name in it: bytes that are not UTF-8 become \\xNN.
+py::str shownText(std::string_view message) {
+  return py::reinterpret_steal<py::str>(
+      PyUnicode_DecodeUTF8(message.data(), static_cast<py::ssize_t>(message.size()), "backslashreplace"));
+}
+
+py::list shownTexts(const std::vector<std::string>& messages) {
+  py::list texts;
+  for (const std::string& message : messages) texts.append(shownText(message));
+  return texts;
+}
+
+/// A path as os.fsdecode() has it.
+py::str nameOf(const std::filesystem::path& path) {
+  return py::reinterpret_steal<py::str>(PyUnicode_DecodeFSDefault(path.c_str()));
+}
+
 py::dict statisticsOf(const FrameStatistics& statistics) {
   py::dict out;
   out["splats_drawn"] = statistics.splats_drawn;
@@ -66,8 +84,8 @@ py::tuple render(OpenCache& cache, const Options& function, const Options& camer
   const PictureArguments arguments = pictureArguments(function, camera, frame, others);
   const auto busy = cache.use();
   const DrawnPicture picture = cache.withScalar(arguments.scalar.scalar).render(arguments, progress);
-  return py::make_tuple(picture.rgba, picture.chosen, picture.notes, picture.warnings, picture.channels,
-                        statisticsOf(picture.statistics));
+  return py::make_tuple(picture.rgba, shownText(picture.chosen), shownTexts(picture.notes),
+                        shownTexts(picture.warnings), picture.channels, statisticsOf(picture.statistics));
 }
 
 py::list scalarsOf(OpenCache& cache) {
@@ -222,8 +240,8 @@ py::dict reportOf(const ConvertReport& report, const std::vector<std::string>& n
   uint64_t bytes = 0;
   for (const FileReport& file : report.files) bytes += file.bytes;
   out["bytes"] = bytes;
-  out["warnings"] = report.warnings;
-  out["notes"] = notes;
+  out["warnings"] = shownTexts(report.warnings);
+  out["notes"] = shownTexts(notes);
   out["steps"] = 1;
   return out;
 }
@@ -409,16 +427,19 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "The libraries of curvisplat; use the package curvisplat.";
   module.attr("version") = CURVISPLAT_VERSION;
 
-  const auto error = py::register_exception<Error>(module, "Error", PyExc_RuntimeError);
-  const py::tuple usage_bases = py::make_tuple(error, py::reinterpret_borrow<py::object>(PyExc_ValueError));
-  py::register_exception<UsageError>(module, "UsageError", usage_bases);
-
-  static const py::handle error_type = error;
+  static const py::handle error_type = py::exception<Error>(module, "Error", PyExc_RuntimeError).release();
+  const py::tuple usage_bases =
+      py::make_tuple(error_type, py::reinterpret_borrow<py::object>(PyExc_ValueError));
+  static const py::handle usage_type = py::exception<UsageError>(module, "UsageError", usage_bases).release();
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const std::filesystem::filesystem_error& failure) {
-      PyErr_SetString(error_type.ptr(), textOf(failure).c_str());
+      PyErr_SetObject(error_type.ptr(), shownText(textOf(failure)).ptr());
+    } catch (const UsageError& failure) {
+      PyErr_SetObject(usage_type.ptr(), shownText(failure.what()).ptr());
+    } catch (const Error& failure) {
+      PyErr_SetObject(error_type.ptr(), shownText(failure.what()).ptr());
     }
   });
 
@@ -430,7 +451,7 @@ PYBIND11_MODULE(_core, module) {
   module.def("set_interrupt_hook", &setInterruptHook);
   py::class_<RemoteFolder, std::shared_ptr<RemoteFolder>>(module, "RemoteFolder")
       .def(py::init<const std::filesystem::path&, py::object>())
-      .def_property_readonly("path", [](const RemoteFolder& folder) { return folder.path().string(); })
+      .def_property_readonly("path", [](const RemoteFolder& folder) { return nameOf(folder.path()); })
       .def_property_readonly("fetched_bytes", &RemoteFolder::fetchedBytes);
   py::class_<OpenCache>(module, "OpenCache")
       .def(py::init([](const std::filesystem::path& path) { return opened(path, nullptr); }))
@@ -447,7 +468,7 @@ PYBIND11_MODULE(_core, module) {
       .def_property_readonly(
           "time_unit", [](const OpenCache& cache) { return cache.reader()->seriesManifest().time_unit; })
       .def_property_readonly("path",
-                             [](const OpenCache& cache) { return cache.reader()->cachePath().string(); })
+                             [](const OpenCache& cache) { return nameOf(cache.reader()->cachePath()); })
       .def_property_readonly("scalars", &scalarsOf)
       .def_property_readonly(
           "lower", [](const OpenCache& cache) { return coordinatesOf(cache.reader()->manifest().lower); })
