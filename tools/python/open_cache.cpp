@@ -292,11 +292,11 @@ std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) co
   const size_t variable = reader->variableNamed(arguments.scalar);
   if (!(arguments.low < arguments.high) || !std::isfinite(arguments.high - arguments.low) ||
       (arguments.log && !(arguments.low > 0)))
-    throw UsageError("a histogram from {} to {}: expected a finite range that increases{}", arguments.low,
-                     arguments.high, arguments.log ? " and is above zero" : "");
+    throw UsageError("range: from {} to {}; expected a finite range that increases{}", arguments.low,
+                     arguments.high, arguments.log ? " and is above zero, as log needs" : "");
   constexpr size_t kMaxBins = 1 << 20;
   if (arguments.bins == 0 || arguments.bins > kMaxBins)
-    throw UsageError("a histogram of {} bins: expected from 1 to {}", arguments.bins, kMaxBins);
+    throw UsageError("bins: {}; expected from 1 to {}", arguments.bins, kMaxBins);
   EditedFunction function(kMapsOnDark.sequential, arguments.low, arguments.high, 1);
   function.setLogScale(arguments.log);
   return histogramOf(*reader, variable, function, arguments.bins);
