@@ -377,7 +377,7 @@ class HostileTest(unittest.TestCase):
             def look(*state):
                 seen.append((cache.scalars[0].min, repr(cache), cache.bounds[1].tolist(), cache.blocks, len(cache.orbit(frames=2))))
                 for attempt in (cache.close, cache.histogram, cache.sample, cache.points, lambda: cache.probe((0, 0, 0)), lambda: cache.render("s")):
-                    expect(curvisplat.UsageError, "is in use", attempt)
+                    expect(curvisplat.UsageError, "is in use by another thread, or by the call", attempt)
             for tries in range(20):
                 cache.render("s", size=(1500, 1500), shade=True, threads=1, step=1, progress=look)
                 assert cache.scalars[0].min == 7, cache.scalars

@@ -259,7 +259,9 @@ void OpenCache::requireOwnProcess() const {
 
 OpenCache::Use OpenCache::use() {
   requireOwnProcess();
-  if (busy_) throw UsageError("the cache is in use by another thread; open it once for each thread");
+  if (busy_)
+    throw UsageError(
+        "the cache is in use by another thread, or by the call that calls this one; open it once for each");
   busy_ = true;
   return Use(busy_);
 }
