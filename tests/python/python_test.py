@@ -405,8 +405,7 @@ class Data(PythonTest):
         import inspect
         for name in curvisplat.__all__:
             thing = getattr(curvisplat, name)
-            if name != "colour_maps":
-                self.assertTrue(inspect.getdoc(thing), name)
+            self.assertTrue(inspect.getdoc(thing), name)
             if inspect.isclass(thing) and not issubclass(thing, (Exception, np.ndarray, tuple)):
                 for method, function in vars(thing).items():
                     if not method.startswith("_") and callable(function):
