@@ -82,7 +82,8 @@ void removeAbandoned(const std::filesystem::path& folder, const TemporaryNames& 
   }
 }
 
-TemporarySubfolder::TemporarySubfolder(const std::filesystem::path& parent, std::string_view ending) {
+TemporarySubfolder::TemporarySubfolder(const std::filesystem::path& parent, std::string_view ending)
+    : process_(::getpid()) {
   constexpr int kOpenFolder = O_RDONLY | O_DIRECTORY | O_NOFOLLOW;
   const TemporaryNames names{"curvisplat.", ending};
   removeAbandoned(parent, names, kOpenFolder,
@@ -112,7 +113,7 @@ TemporarySubfolder::TemporarySubfolder(const std::filesystem::path& parent, std:
 
 void TemporarySubfolder::remove() noexcept {
   if (fd_ < 0) return;
-  removeAll(path_);
+  if (::getpid() == process_) removeAll(path_);
   SystemCalls::current().close(fd_);
   fd_ = -1;
 }

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <sys/stat.h>
+#include <sys/types.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -69,11 +70,13 @@ class TemporarySubfolder {
   TemporarySubfolder& operator=(const TemporarySubfolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// Removes the folder and everything in it. Files that are open stay readable.
+  /// Removes the folder and everything in it, but not in a process that was forked, whose parent has the folder. Files that are open
+  /// stay readable.
   void remove() noexcept;
 
  private:
   std::filesystem::path path_;
+  pid_t process_;
   int fd_ = -1;  // locked, so that other processes leave the folder alone; -1: removed
 };
 

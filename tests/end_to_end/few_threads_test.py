@@ -4,10 +4,13 @@
 Each command as a user who may have few processes and threads (ulimit -u): it works, or ends with one line and status 1, and
 leaves nothing. The limit does not bind root, so that the test needs the right to become another user.
 """
+import contextlib
+import importlib.util
 import os
 import pathlib
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import unittest
@@ -72,6 +75,55 @@ class FewThreads(LimitedUserTest):
                     break
             # On machines of many cores more threads are needed.
             self.assertTrue(succeeded or os.cpu_count() > 8, command)
+
+    def test_a_viewer_too_many_for_the_threads_is_refused_and_the_others_go_on(self):
+        sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "serve"))
+        if importlib.util.find_spec("websocket") is None:
+            self.skipTest("python3-websocket is not installed")
+        from serving import Viewer, serving, websocket
+
+        class RefusedError(Exception):
+            pass
+
+        class OneTry:
+            def socket(self):
+                line = server.socket()
+                if line.sock.recv(1, socket.MSG_PEEK)[0] & 15 == websocket.ABNF.OPCODE_CLOSE:
+                    with contextlib.closing(line.sock):
+                        raise RefusedError(line.sock.recv(200)[4:].decode())
+                return line
+
+        def draws(viewer):
+            viewer.open()
+            viewer.view()
+            return viewer.picture()
+
+        def limit(threads):
+            # As the server's user: others need a further right.
+            change = f"import resource; resource.prlimit({server.process.pid}, resource.RLIMIT_NPROC, ({threads}, {many}))"
+            subprocess.run([sys.executable, "-c", change], check=True, cwd=self.folder, preexec_fn=lambda: become_limited(many))
+
+        many, places = 4096, 6
+        with contextlib.ExitStack() as stack:
+            try:
+                server = stack.enter_context(
+                    serving(PROGRAM, ["o.splats"], "--viewer-memory", "64M", "--memory", f"{places * 64}M", "--backend", "cpu", cwd=self.folder,
+                            env={"HOME": str(self.folder / "work")}, preexec_fn=lambda: become_limited(many)))
+            except (PermissionError, subprocess.SubprocessError) as error:
+                self.skipTest(f"another user cannot run the program here: {error}")
+            viewers = [Viewer(OneTry()) for _ in range(2)]
+            limit(server.threads())
+            for _ in range(places):
+                with self.assertRaisesRegex(RefusedError, "no threads"):
+                    Viewer(OneTry())
+            self.assertIn("a viewer is refused: cannot start", server.messages())
+            self.assertRegex(draws(viewers[0]), "cannot start .* threads")
+            limit(many)
+            viewers += [Viewer(OneTry()) for _ in range(places - len(viewers))]  # none is counted that was refused
+            for viewer in viewers:
+                self.assertIsInstance(draws(viewer), bytes)
+                viewer.socket.close()
+            self.assertEqual(server.stop(), 130)
 
     def test_the_window_ends_with_one_line_before_it_opens(self):
         most = 3 + os.cpu_count()

@@ -160,6 +160,18 @@ class HostileTest(unittest.TestCase):
                 expect(curvisplat.Error, "", attempt)
             """)
 
+    def test_paths_that_are_no_text(self):
+        self.attempt("""
+            x, y, z, s = grid()
+            name = b"o\\xff.splats"
+            curvisplat.convert_arrays(name, Block(x, y, z, {"s": s}))
+            cache = curvisplat.open(name)
+            assert os.fsencode(cache.path) == name, cache.path
+            expect(curvisplat.Error, "o\\\\xff.splats: the cache has no scalar 'none'", lambda: cache.render("none"))
+            expect(curvisplat.Error, "none\\\\xff: does not exist", lambda: curvisplat.open(b"none\\xff"))
+            shutil.rmtree(name)
+            """)
+
     def test_functions_that_answer_nonsense(self):
         self.attempt("""
             read = reader()
@@ -313,6 +325,66 @@ class HostileTest(unittest.TestCase):
             for thread in threads: thread.start()
             for thread in threads: thread.join()
             assert done and all("is in use by another thread" in error for error in errors), errors
+            """)
+
+    def test_scalars_with_blanks_of_their_own_are_opened_by_several_threads(self):
+        self.attempt("""
+            x, y, z, s = grid()
+            scalars = {f"s{n}": s.copy() for n in range(12)}
+            for n, values in enumerate(scalars.values()):
+                values[n % 8, 3 * n % 8] = np.nan
+            convert(scalars=scalars)
+            refused = []
+            for number in range(100):
+                cache = curvisplat.open("o.splats")
+                begun = threading.Barrier(8)
+                def work(what):
+                    begun.wait()
+                    try:
+                        what()
+                    except curvisplat.UsageError as error:
+                        refused.append(str(error))
+                draws = lambda: [cache.render("s5", size=(8, 8)), cache.close()] if number % 50 == 0 else repr(cache)
+                works = [draws, cache.close, lambda: cache.histogram("s9"), *5 * [lambda: cache.scalars]]
+                threads = [threading.Thread(target=work, args=(what,)) for what in works]
+                for thread in threads: thread.start()
+                for thread in threads: thread.join()
+                assert sorted(scalar.name for scalar in cache.scalars) == sorted(scalars)
+            assert all("is in use by another thread" in error for error in refused), refused
+            child = os.fork()
+            if child == 0:
+                signal.alarm(30)
+                assert len(cache.scalars) == 12  # they are open
+                os._exit(0)
+            assert os.waitpid(child, 0)[1] == 0
+            cache = curvisplat.open("o.splats")
+            child = os.fork()
+            if child == 0:
+                signal.alarm(30)
+                expect(curvisplat.UsageError, "before this process was forked", lambda: cache.scalars)
+                os._exit(0)
+            assert os.waitpid(child, 0)[1] == 0
+            """)
+
+    def test_a_function_for_progress_uses_the_cache_that_is_drawn(self):
+        """It reads what is known of the step before, and may not use what is in use."""
+        self.attempt("""
+            arrays = grid(24)
+            convert(*arrays, time=0)
+            curvisplat.append_arrays("o.splats", Block(*arrays[:3], {"s": arrays[3] + 7}))
+            cache = curvisplat.open("o.splats")
+            seen = []
+            def look(*state):
+                seen.append((cache.scalars[0].min, repr(cache), cache.bounds[1].tolist(), cache.blocks, len(cache.orbit(frames=2))))
+                for attempt in (cache.close, cache.histogram, cache.sample, cache.points, lambda: cache.probe((0, 0, 0)), lambda: cache.render("s")):
+                    expect(curvisplat.UsageError, "is in use by another thread, or by the call", attempt)
+            for tries in range(20):
+                cache.render("s", size=(1500, 1500), shade=True, threads=1, step=1, progress=look)
+                assert cache.scalars[0].min == 7, cache.scalars
+                if seen:
+                    break
+                cache = curvisplat.open("o.splats")
+            assert seen and all(one[0] == 0 for one in seen), seen
             """)
 
 

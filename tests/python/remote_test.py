@@ -161,6 +161,51 @@ class Remote(unittest.TestCase):
             gc.collect()
             self.assertEqual(os.listdir(folder), [])
 
+    def test_a_process_that_is_forked_leaves_the_files_to_its_parent(self):
+        with tempfile.TemporaryDirectory() as folder, curvisplat.open(self.url, folder=folder) as cache:
+            held, let_go = threading.Event(), threading.Event()
+
+            def hold():  # a thread that the new process does not have
+                with cache._core._remote._lock:
+                    held.set()
+                    let_go.wait()
+
+            thread = threading.Thread(target=hold)
+            thread.start()
+            held.wait()
+            child = os.fork()
+            if child == 0:
+                signal.alarm(30)
+                failed = cache.samples == 0
+                cache.__dict__.clear()
+                gc.collect()
+                os._exit(failed)
+            let_go.set()
+            thread.join()
+            self.assertEqual(os.waitpid(child, 0)[1], 0)
+            self.assertEqual(len(os.listdir(folder)), 1)
+            cache.render(size=(20, 20))
+
+    def test_what_handles_a_signal_reads_the_cache(self):
+        cache = curvisplat.open(self.url)
+        before = signal.signal(signal.SIGUSR1, lambda *_: cache.title)
+        try:
+            with cache._core._remote._lock, cache._core._remote._connections._lock:
+                os.kill(os.getpid(), signal.SIGUSR1)
+            cache.render(size=(20, 20))
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+
+    def test_scalars_with_blanks_of_their_own(self):
+        k, j, i = np.meshgrid(*3 * [np.linspace(0, 1, 24)], indexing="ij")
+        half = np.where(i < 0.5, np.nan, i).astype("f4")
+        curvisplat.convert_arrays(self.root / "own.splats", curvisplat.Block(i, j, k, {"whole": (i + j).astype("f4"), "half": half}), overwrite=True)
+        remote, local = curvisplat.open(self.server.url + "/own.splats"), self.local("own")
+        for _ in range(2):
+            np.testing.assert_array_equal(remote.render("half", size=(80, 60)), local.render("half", size=(80, 60)))
+            remote.close()
+        self.assertEqual(remote.scalars, local.scalars)
+
     def test_headers_and_names_in_the_address(self):
         cache = curvisplat.open(self.url.replace("//", "//me:a%20secret@") + "?key=1", headers={"X-Key": "2"})
         self.assertEqual(cache.path, self.url)

@@ -34,12 +34,12 @@ def wait_for(condition, what, patience_s=PATIENCE_S):
 
 
 class Server:
-    """`curvisplat serve` of some caches, at a port of its own."""
+    """`curvisplat serve` of some caches, at a port of its own. `process`: as subprocess.Popen takes it."""
 
-    def __init__(self, program, caches, *options, port=0):
+    def __init__(self, program, caches, *options, port=0, **process):
         self.command = [str(program), "serve", *map(str, caches), "--port", str(port), *options]
         self.log = tempfile.TemporaryFile("w+")
-        self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=self.log, text=True)
+        self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=self.log, text=True, **process)
         self.url = self.process.stdout.readline().strip()
         if not self.url.startswith("http://"):
             raise AssertionError(f"the server did not start: {self.messages()}")
@@ -81,8 +81,8 @@ class Server:
 
 
 @contextlib.contextmanager
-def serving(program, caches, *options, port=0):
-    server = Server(program, caches, *options, port=port)
+def serving(program, caches, *options, **more):
+    server = Server(program, caches, *options, **more)
     try:
         yield server
     finally:

@@ -52,6 +52,7 @@ ServerOptions optionsFrom(const ServeArguments& arguments) {
                      arguments.viewer_memory);
   options.each.backend = parseBackend(arguments.backend);
   options.each.faces_at = facesAtStep;
+  options.each.require_threads = [] { requireThreads(); };
   if (arguments.frame_time)
     options.each.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
   const uint64_t memory = parseByteSize("--memory", arguments.memory);

@@ -161,7 +161,7 @@ py::tuple pointArrays(const CacheReader& cache, const DataChoice& choice, const 
       arrayOf(std::move(points.volumes), {count}), arrayOf(std::move(points.shapes), {count, 3, 3}));
 }
 
-py::tuple probedArrays(const std::vector<const CacheReader*>& sets,
+py::tuple probedArrays(const std::vector<std::shared_ptr<const CacheReader>>& sets,
                        const std::vector<std::array<double, 3>>& points,
                        const std::optional<std::vector<std::filesystem::path>>& source) {
   std::vector<glm::dvec3> at;
@@ -175,7 +175,7 @@ py::tuple probedArrays(const std::vector<const CacheReader*>& sets,
   if (source) setSource(*sets.front(), *source, from.grid);
   std::vector<CacheReader> at_step;
   at_step.reserve(sets.size());
-  for (const CacheReader* const set : sets) {
+  for (const auto& set : sets) {
     const StepPosition& position = sets.front()->position();
     const bool has_ended = position.step >= set->series().steps.size();
     at_step.push_back(set->at(has_ended ? set->position() : position));

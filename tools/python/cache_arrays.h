@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,7 +36,7 @@ pybind11::tuple pointArrays(const CacheReader& cache, const DataChoice& choice,
 /// Probes points. Returns, as joinedValues() does, each scalar's value at the points and at the samples next to them, and the block, the
 /// indices and the places of these samples; outside of the data NaN, and block 0. `sets`: the cache, and those of its scalars with
 /// blanks of their own. `source`: the grid's files; empty: those that the cache names; nullopt: the cache alone is read.
-pybind11::tuple probedArrays(const std::vector<const CacheReader*>& sets,
+pybind11::tuple probedArrays(const std::vector<std::shared_ptr<const CacheReader>>& sets,
                              const std::vector<std::array<double, 3>>& points,
                              const std::optional<std::vector<std::filesystem::path>>& source);
 

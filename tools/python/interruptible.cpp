@@ -94,9 +94,10 @@ py::object& interruptHook() {
 }
 
 void callInterruptHook() {
-  if (!interruptHook()) return;
+  const py::object hook = interruptHook();  // which another thread may replace
+  if (!hook) return;
   try {
-    interruptHook()();
+    hook();
   } catch (py::error_already_set&) {
     // What has stopped the work is reported.
   }

@@ -14,6 +14,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -48,6 +49,23 @@ glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
 }
 
+/// A message, which may have a file's name in it: bytes that are not UTF-8 become \\xNN.
+py::str shownText(std::string_view message) {
+  return py::reinterpret_steal<py::str>(
+      PyUnicode_DecodeUTF8(message.data(), static_cast<py::ssize_t>(message.size()), "backslashreplace"));
+}
+
+py::list shownTexts(const std::vector<std::string>& messages) {
+  py::list texts;
+  for (const std::string& message : messages) texts.append(shownText(message));
+  return texts;
+}
+
+/// A path as os.fsdecode() has it.
+py::str nameOf(const std::filesystem::path& path) {
+  return py::reinterpret_steal<py::str>(PyUnicode_DecodeFSDefault(path.c_str()));
+}
+
 py::dict statisticsOf(const FrameStatistics& statistics) {
   py::dict out;
   out["splats_drawn"] = statistics.splats_drawn;
@@ -60,38 +78,26 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
   return out;
 }
 
-/// OpenCache::withScalar(), which may read files, without the interpreter's lock.
-OpenCache& withScalar(OpenCache& cache, const std::string& name) {
-  const UnlockedWork unlocked;
-  return cache.withScalar(name);
-}
-
-/// Opens the caches of scalars with blanks of their own.
-void openOwnBlanks(OpenCache& cache) {
-  const UnlockedWork unlocked;
-  for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n) cache.ownBlanks(n);
-}
-
 /// `function`, `camera`, `frame`: text by option; `others`: lists, flags and numbers.
 py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
                  const py::dict& others, const py::object& progress) {
   const PictureArguments arguments = pictureArguments(function, camera, frame, others);
-  OpenCache& drawn = withScalar(cache, arguments.scalar.scalar);
-  const DrawnPicture picture = drawn.render(arguments, progress);
-  return py::make_tuple(picture.rgba, picture.chosen, picture.notes, picture.warnings, picture.channels,
-                        statisticsOf(picture.statistics));
+  const auto busy = cache.use();
+  const DrawnPicture picture = cache.withScalar(arguments.scalar.scalar).render(arguments, progress);
+  return py::make_tuple(picture.rgba, shownText(picture.chosen), shownTexts(picture.notes),
+                        shownTexts(picture.warnings), picture.channels, statisticsOf(picture.statistics));
 }
 
 py::list scalarsOf(OpenCache& cache) {
   py::list out;
-  const auto add = [&out](const Manifest& manifest) {
-    for (const VariableInfo& variable : manifest.variables)
+  const auto add = [&out](const OpenCache& one) {
+    const std::shared_ptr<const CacheReader> reader = one.reader();
+    for (const VariableInfo& variable : reader->manifest().variables)
       out.append(py::make_tuple(variable.name, variable.unit, variable.min, variable.max));
   };
-  openOwnBlanks(cache);
-  add(cache.reader().manifest());
-  for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n)
-    add(cache.ownBlanks(n).reader().manifest());
+  const std::vector<OpenCache*> own_blanks = cache.allOwnBlanks();
+  add(cache);
+  for (const OpenCache* const own : own_blanks) add(*own);
   return out;
 }
 
@@ -105,17 +111,16 @@ std::unique_ptr<OpenCache> opened(const std::filesystem::path& path, std::shared
 }
 
 std::vector<double> timesOf(const OpenCache& cache) {
+  const std::shared_ptr<const CacheReader> reader = cache.reader();
   std::vector<double> times;
-  for (const SeriesStep& step : cache.reader().series().steps) times.push_back(step.time);
+  for (const SeriesStep& step : reader->series().steps) times.push_back(step.time);
   return times;
 }
 
 std::vector<double> histogramOfCache(OpenCache& whole, const std::string& scalar,
                                      const std::pair<double, double>& range, bool log, size_t bins) {
-  OpenCache& cache = withScalar(whole, scalar);
-  const auto busy = cache.use();
-  const UnlockedWork unlocked;
-  return cache.histogram({scalar, range.first, range.second, log, bins});
+  const auto busy = whole.use();
+  return whole.withScalar(scalar).histogram({scalar, range.first, range.second, log, bins});
 }
 
 /// (position, focal_point, view_up, parallel_scale) of each frame.
@@ -126,7 +131,8 @@ py::list camerasOf(const OpenCache& cache, const Options& camera, const std::str
   checkCameraArguments(arguments);
   if (frames == 0 || frames > kMaxFrames)
     throw UsageError("{} frames: expected from 1 to {}", frames, kMaxFrames);
-  const Manifest& manifest = cache.reader().manifest();
+  const std::shared_ptr<const CacheReader> reader = cache.reader();
+  const Manifest& manifest = reader->manifest();
   const auto vertical = camera.find("vertical_scale");
   const glm::dvec3 factors = verticallyScaled(
       parsePoint("scale", scale), vertical == camera.end() ? std::nullopt : std::optional(vertical->second),
@@ -156,22 +162,20 @@ py::tuple orbitedCamera(const std::array<double, 3>& position, const std::array<
 py::tuple probeAt(OpenCache& cache, const std::vector<std::array<double, 3>>& points,
                   const std::optional<std::vector<std::filesystem::path>>& source) {
   const auto busy = cache.use();
-  openOwnBlanks(cache);
-  std::vector<const CacheReader*> sets{&cache.reader()};
-  for (size_t n = 0; n < cache.reader().seriesManifest().own_blanks.size(); ++n)
-    sets.push_back(&cache.ownBlanks(n).reader());
+  std::vector<std::shared_ptr<const CacheReader>> sets{cache.reader()};
+  for (const OpenCache* const own : cache.allOwnBlanks()) sets.push_back(own->reader());
   return probedArrays(sets, points, source);
 }
 
 py::tuple sample(OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,
                  const py::object& progress) {
   const auto busy = cache.use();
-  return sampledArrays(withScalar(cache, choice.scalar).reader(), choice, size, progress);
+  return sampledArrays(*cache.withScalar(choice.scalar).reader(), choice, size, progress);
 }
 
 py::tuple points(OpenCache& cache, const DataChoice& choice, const py::object& progress) {
   const auto busy = cache.use();
-  return pointArrays(withScalar(cache, choice.scalar).reader(), choice, progress);
+  return pointArrays(*cache.withScalar(choice.scalar).reader(), choice, progress);
 }
 
 /// A number of parts or "auto", the default. Throws UsageError.
@@ -236,8 +240,8 @@ py::dict reportOf(const ConvertReport& report, const std::vector<std::string>& n
   uint64_t bytes = 0;
   for (const FileReport& file : report.files) bytes += file.bytes;
   out["bytes"] = bytes;
-  out["warnings"] = report.warnings;
-  out["notes"] = notes;
+  out["warnings"] = shownTexts(report.warnings);
+  out["notes"] = shownTexts(notes);
   out["steps"] = 1;
   return out;
 }
@@ -423,16 +427,19 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "The libraries of curvisplat; use the package curvisplat.";
   module.attr("version") = CURVISPLAT_VERSION;
 
-  const auto error = py::register_exception<Error>(module, "Error", PyExc_RuntimeError);
-  const py::tuple usage_bases = py::make_tuple(error, py::reinterpret_borrow<py::object>(PyExc_ValueError));
-  py::register_exception<UsageError>(module, "UsageError", usage_bases);
-
-  static const py::handle error_type = error;
+  static const py::handle error_type = py::exception<Error>(module, "Error", PyExc_RuntimeError).release();
+  const py::tuple usage_bases =
+      py::make_tuple(error_type, py::reinterpret_borrow<py::object>(PyExc_ValueError));
+  static const py::handle usage_type = py::exception<UsageError>(module, "UsageError", usage_bases).release();
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const std::filesystem::filesystem_error& failure) {
-      PyErr_SetString(error_type.ptr(), textOf(failure).c_str());
+      PyErr_SetObject(error_type.ptr(), shownText(textOf(failure)).ptr());
+    } catch (const UsageError& failure) {
+      PyErr_SetObject(usage_type.ptr(), shownText(failure.what()).ptr());
+    } catch (const Error& failure) {
+      PyErr_SetObject(error_type.ptr(), shownText(failure.what()).ptr());
     }
   });
 
@@ -444,7 +451,7 @@ PYBIND11_MODULE(_core, module) {
   module.def("set_interrupt_hook", &setInterruptHook);
   py::class_<RemoteFolder, std::shared_ptr<RemoteFolder>>(module, "RemoteFolder")
       .def(py::init<const std::filesystem::path&, py::object>())
-      .def_property_readonly("path", [](const RemoteFolder& folder) { return folder.path().string(); })
+      .def_property_readonly("path", [](const RemoteFolder& folder) { return nameOf(folder.path()); })
       .def_property_readonly("fetched_bytes", &RemoteFolder::fetchedBytes);
   py::class_<OpenCache>(module, "OpenCache")
       .def(py::init([](const std::filesystem::path& path) { return opened(path, nullptr); }))
@@ -458,27 +465,28 @@ PYBIND11_MODULE(_core, module) {
       .def("points", &points)
       .def("histogram", &histogramOfCache)
       .def_property_readonly("times", &timesOf)
-      .def_property_readonly("time_unit",
-                             [](const OpenCache& cache) { return cache.reader().seriesManifest().time_unit; })
+      .def_property_readonly(
+          "time_unit", [](const OpenCache& cache) { return cache.reader()->seriesManifest().time_unit; })
       .def_property_readonly("path",
-                             [](const OpenCache& cache) { return cache.reader().cachePath().string(); })
+                             [](const OpenCache& cache) { return nameOf(cache.reader()->cachePath()); })
       .def_property_readonly("scalars", &scalarsOf)
       .def_property_readonly(
-          "lower", [](const OpenCache& cache) { return coordinatesOf(cache.reader().manifest().lower); })
+          "lower", [](const OpenCache& cache) { return coordinatesOf(cache.reader()->manifest().lower); })
       .def_property_readonly(
-          "upper", [](const OpenCache& cache) { return coordinatesOf(cache.reader().manifest().upper); })
-      .def_property_readonly("title", [](const OpenCache& cache) { return cache.reader().manifest().title; })
+          "upper", [](const OpenCache& cache) { return coordinatesOf(cache.reader()->manifest().upper); })
+      .def_property_readonly("title", [](const OpenCache& cache) { return cache.reader()->manifest().title; })
       .def_property_readonly("samples",
-                             [](const OpenCache& cache) { return cache.reader().manifest().nodes; })
+                             [](const OpenCache& cache) { return cache.reader()->manifest().nodes; })
       .def_property_readonly("splats",
-                             [](const OpenCache& cache) { return cache.reader().manifest().splats; })
+                             [](const OpenCache& cache) { return cache.reader()->manifest().splats; })
       .def_property_readonly("levels",
-                             [](const OpenCache& cache) { return cache.reader().manifest().levels; })
+                             [](const OpenCache& cache) { return cache.reader()->manifest().levels; })
       .def_property_readonly("volume",
-                             [](const OpenCache& cache) { return cache.reader().manifest().volume; })
+                             [](const OpenCache& cache) { return cache.reader()->manifest().volume; })
       .def_property_readonly("blocks", [](const OpenCache& cache) {
+        const std::shared_ptr<const CacheReader> reader = cache.reader();
         py::list out;
-        for (const BlockInfo& block : cache.reader().manifest().blocks)
+        for (const BlockInfo& block : reader->manifest().blocks)
           out.append(py::make_tuple(block.name, block.ni, block.nj, block.nk));
         return out;
       });

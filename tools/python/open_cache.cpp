@@ -191,10 +191,23 @@ std::vector<std::string> warningsOf(const PictureArguments& arguments, const Ima
   return warnings;
 }
 
+/// Replaces the reader that others see when a picture is done or has failed: by then its thread has ended, and this one has
+/// the interpreter's lock.
+struct LaterReader {
+  std::shared_ptr<const CacheReader>& shown;
+  std::shared_ptr<const CacheReader> reader = nullptr;
+  ~LaterReader() {
+    if (reader) shown = std::move(reader);
+  }
+};
+
 }  // namespace
 
 OpenCache::OpenCache(CacheReader reader, std::shared_ptr<void> mirror)
-    : mirror_(std::move(mirror)), process_(::getpid()), reader_(std::move(reader)) {}
+    : mirror_(std::move(mirror)),
+      process_(::getpid()),
+      shown_(std::make_shared<const CacheReader>(reader.at(reader.position()))),
+      reader_(std::move(reader)) {}
 
 /// Gives up the interpreter's lock meanwhile if the cache is remote: threads that still read need it. Where the interpreter
 /// ends, they have been stopped.
@@ -208,13 +221,26 @@ void OpenCache::endPlayer() {
 }
 
 OpenCache& OpenCache::ownBlanks(size_t set) {
-  std::unique_ptr<OpenCache>& cache = own_blanks_[set];
-  if (!cache) cache = std::make_unique<OpenCache>(reader_.ownBlanks(set));
-  return *cache;
+  if (const auto known = own_blanks_.find(set); known != own_blanks_.end()) return *known->second;
+  requireOwnProcess();
+  std::unique_ptr<OpenCache> opened;
+  {
+    const std::shared_ptr<const CacheReader> reader = shown_;
+    const UnlockedWork unlocked;
+    opened = std::make_unique<OpenCache>(reader->ownBlanks(set), mirror_);
+  }
+  // Others may have opened it meanwhile: another thread, or what Python ran for a remote one.
+  return *own_blanks_.try_emplace(set, std::move(opened)).first->second;
+}
+
+std::vector<OpenCache*> OpenCache::allOwnBlanks() {
+  std::vector<OpenCache*> all;
+  for (size_t n = 0; n < shown_->seriesManifest().own_blanks.size(); ++n) all.push_back(&ownBlanks(n));
+  return all;
 }
 
 OpenCache& OpenCache::withScalar(const std::string& name) {
-  const std::optional<size_t> set = reader_.ownBlanksOf(name);
+  const std::optional<size_t> set = shown_->ownBlanksOf(name);
   return set ? ownBlanks(*set) : *this;
 }
 
@@ -226,10 +252,16 @@ OpenCache::~OpenCache() {
     endPlayer();
 }
 
-OpenCache::Use OpenCache::use() {
+void OpenCache::requireOwnProcess() const {
   if (::getpid() != process_)
     throw UsageError("the cache was opened before this process was forked; open it again in each process");
-  if (busy_) throw UsageError("the cache is in use by another thread; open it once for each thread");
+}
+
+OpenCache::Use OpenCache::use() {
+  requireOwnProcess();
+  if (busy_)
+    throw UsageError(
+        "the cache is in use by another thread, or by the call that calls this one; open it once for each");
   busy_ = true;
   return Use(busy_);
 }
@@ -257,21 +289,22 @@ void OpenCache::goTo(const StepPosition& position) {
 }
 
 std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) const {
-  const size_t variable = reader_.variableNamed(arguments.scalar);
+  const std::shared_ptr<const CacheReader> reader = shown_;
+  const UnlockedWork unlocked;
+  const size_t variable = reader->variableNamed(arguments.scalar);
   if (!(arguments.low < arguments.high) || !std::isfinite(arguments.high - arguments.low) ||
       (arguments.log && !(arguments.low > 0)))
-    throw UsageError("a histogram from {} to {}: expected a finite range that increases{}", arguments.low,
-                     arguments.high, arguments.log ? " and is above zero" : "");
+    throw UsageError("range: from {} to {}; expected a finite range that increases{}", arguments.low,
+                     arguments.high, arguments.log ? " and is above zero, as log needs" : "");
   constexpr size_t kMaxBins = 1 << 20;
   if (arguments.bins == 0 || arguments.bins > kMaxBins)
-    throw UsageError("a histogram of {} bins: expected from 1 to {}", arguments.bins, kMaxBins);
+    throw UsageError("bins: {}; expected from 1 to {}", arguments.bins, kMaxBins);
   EditedFunction function(kMapsOnDark.sequential, arguments.low, arguments.high, 1);
   function.setLogScale(arguments.log);
-  return histogramOf(reader_, variable, function, arguments.bins);
+  return histogramOf(*reader, variable, function, arguments.bins);
 }
 
 DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::object& progress) {
-  const Use in_use = use();
   const bool has_opacities = !arguments.opacity.by.scalar.empty();
   checkCameraArguments(arguments.camera);
   checkFunctionArguments(arguments.scalar);
@@ -283,8 +316,11 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
   PixelValues values;
   const ImageSize size = arguments.frame.size;
   requireThreads(arguments.frame.threads, "threads");
+  LaterReader later{shown_};
   runInterruptibly(progress, [&](Progress& of_work) {
     goTo(chosenSteps(arguments.steps, reader_).front());
+    if (!(shown_->position() == reader_.position()))
+      later.reader = std::make_shared<const CacheReader>(reader_.at(reader_.position()));
     const Manifest manifest = reader_.manifest();
     FrameOptions frame = arguments.frame;
     const std::optional<Globe> globe = globeOf(arguments.surfaces.globe, manifest);
@@ -350,7 +386,8 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
 
 void OpenCache::release() {
   const Use in_use = use();
-  for (const auto& [set, cache] : own_blanks_) cache->release();
+  // Others may open further ones meanwhile, which have nothing to end.
+  for (const auto& [set, cache] : own_blanks_) cache->endPlayer();
   endPlayer();
 }
 

@@ -2,8 +2,9 @@
 // passes, as the arguments of `curvisplat render`: values come as text, so that the two read them alike.
 //
 // One call at a time uses an OpenCache; its threads and decoded bricks are kept from one picture of a scalar
-// to the next. Functions with arguments of Python need the interpreter's lock; drawing goes on without it
-// (interruptible.h).
+// to the next. Call all functions with the interpreter's lock, which the members are guarded by; those that read files give it up
+// meanwhile, and drawing goes on without it (interruptible.h). Facts about the cache can be read at any time, also from a
+// function of Python that shows the progress of a picture: they are of the step that was drawn last, until the picture is done.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -67,7 +68,7 @@ struct HistogramArguments {
   size_t bins = 0;
 };
 
-/// An open cache. While one thread uses it, another one gets a UsageError, as does a process that was forked,
+/// An open cache. While one call uses it, another one gets a UsageError, as does a process that was forked,
 /// which lacks the threads.
 class OpenCache {
  public:
@@ -77,9 +78,13 @@ class OpenCache {
   OpenCache(const OpenCache&) = delete;
   OpenCache& operator=(const OpenCache&) = delete;
 
-  const CacheReader& reader() const { return reader_; }
-  /// The cache of CacheReader::ownBlanks(set), open as long as this one. Throws Error as opening it does.
+  /// The cache at the step that was drawn last, which stays as it is when another one is drawn.
+  std::shared_ptr<const CacheReader> reader() const { return shown_; }
+  /// The cache of CacheReader::ownBlanks(set), open as long as this one. Several threads may open it at once; one of them is kept.
+  /// Throws Error as opening it does, and UsageError in a process that was forked.
   OpenCache& ownBlanks(size_t set);
+  /// All caches of scalars with blanks of their own. Throws as ownBlanks().
+  std::vector<OpenCache*> allOwnBlanks();
   /// The cache with the scalar: this one, or the one of scalars with blanks of their own. Throws as ownBlanks().
   OpenCache& withScalar(const std::string& name);
   /// Keeps the cache busy during its lifetime.
@@ -93,30 +98,32 @@ class OpenCache {
    private:
     bool& busy_;
   };
-  /// Call with the interpreter's lock. Throws UsageError if the cache is busy.
+  /// Covers the caches of scalars with blanks of their own, too. Throws UsageError if the cache is busy.
   Use use();
-  /// Throws UsageError and Error as `curvisplat render` does, and what stops runInterruptibly().
+  /// Call it while use() holds, for a scalar of this cache (withScalar()). Throws UsageError and Error as `curvisplat render` does, and what stops runInterruptibly().
   DrawnPicture render(const PictureArguments& arguments, const pybind11::object& progress);
   /// The histogram of the step that was drawn last. Throws UsageError for a range that is empty, or not above
   /// zero where `log`.
   std::vector<double> histogram(const HistogramArguments& arguments) const;
-  /// Ends threads and gives back their memory; the next picture starts them again.
+  /// Ends threads and gives back their memory; the next picture starts them again. Throws as use().
   void release();
 
  private:
+  void requireOwnProcess() const;
   void goTo(const StepPosition& position);
   void endPlayer();
   FrameRenderer& rendererOf(const DrawnScalars& scalars, Backend backend);
 
   const std::shared_ptr<void> mirror_;                       // first: it goes last
-  std::map<size_t, std::unique_ptr<OpenCache>> own_blanks_;  // by their number in the manifest
+  std::map<size_t, std::unique_ptr<OpenCache>> own_blanks_;  // by number in the manifest; none is removed
   const pid_t process_;
-  CacheReader reader_;
+  std::shared_ptr<const CacheReader> shown_;
+  CacheReader reader_;                  // goes from step to step; for what uses the cache
   std::unique_ptr<StepPlayer> player_;  // of reader_
   size_t variable_ = 0;                 // of the opacities
   bool two_scalars_ = false;
   Backend backend_ = Backend::kAutomatic;
-  bool busy_ = false;  // touched with the interpreter's lock held
+  bool busy_ = false;
 };
 
 }  // namespace curvisplat::python

@@ -148,7 +148,13 @@ void Connection::openViewer() {
   socket_.control_callback([this](websocket::frame_type, beast::string_view) {
     if (!rate_.admits(clockSeconds())) drop();
   });
-  viewer_ = host_.newViewer(shared_from_this());
+  try {
+    viewer_ = host_.newViewer(shared_from_this());
+  } catch (const std::exception& error) {
+    printMessage("warning: a viewer is refused: {}", error.what());
+    return close(websocket::close_code::try_again_later,
+                 "the server has no threads or memory left for another viewer");
+  }
   if (!viewer_)
     return close(websocket::close_code::try_again_later,
                  "as many viewers as the server allows are connected");
@@ -179,8 +185,9 @@ void Connection::receive() {
 
 void Connection::send(std::string message, bool is_text) {
   if (closing_) return;
-  outgoing_bytes_ += message.size();
+  const size_t bytes = message.size();
   outgoing_.push_back({std::move(message), is_text});
+  outgoing_bytes_ += bytes;
   if (outgoing_.size() > kMaxWaiting || outgoing_bytes_ > kMaxWaitingBytes) return drop();
   if (outgoing_.size() == 1) writeNext();
 }

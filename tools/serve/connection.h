@@ -30,10 +30,10 @@ class ConnectionHost {
   virtual ~ConnectionHost() = default;
   virtual const ServerOptions& options() const = 0;
   /// Makes a viewer; returns nullptr at the limit of viewers. Its messages go to `connection` while that
-  /// lives.
+  /// lives. Throws Error or std::system_error if the viewer cannot have its threads.
   virtual std::unique_ptr<RemoteViewer> newViewer(const std::shared_ptr<Connection>& connection) = 0;
   /// Ends a viewer, without waiting for it.
-  virtual void endViewer(std::unique_ptr<RemoteViewer> viewer) = 0;
+  virtual void endViewer(std::unique_ptr<RemoteViewer> viewer) noexcept = 0;
 };
 
 class Connection : public std::enable_shared_from_this<Connection> {

@@ -194,6 +194,11 @@ class RemoteViewer::Work {
     if (view.next && *view.next < reader.series().steps.size()) request.next = StepPosition{*view.next};
     if (!frames_ || cache_ != view.cache) {
       frames_.reset();  // frees its memory before the next one allocates
+      try {
+        limits_.require_threads();
+      } catch (const Error& error) {
+        return report(error);
+      }
       frames_ = std::make_unique<FrameLoop>(reader, limits_.backend, [this] { viewer_.wake(); });
       cache_ = view.cache;
       globe_grid_ = {};
@@ -250,6 +255,9 @@ class RemoteViewer::Work {
       report(error);
       frames_.reset();  // it has ended; the next request begins anew
       return;
+    } catch (const std::exception&) {
+      frames_.reset();
+      throw;
     }
     if (!frame) return;
     const GivesBack gives_back{*frames_};
@@ -381,15 +389,17 @@ void RemoteViewer::wake() {
 
 void RemoteViewer::loop() {
   nameThisThread("viewer");
-  std::shared_ptr<const ServedCaches> caches;
   try {
-    caches = folders_.caches();
+    const std::shared_ptr<const ServedCaches> caches = folders_.caches();
     send_(caches->helloText(), true);
+    serve(*caches);
   } catch (const std::exception& error) {
-    printMessage("warning: a viewer: {}", error.what());
-    return;
+    reportFailure(error);
   }
-  Work work(*this, *caches);
+}
+
+void RemoteViewer::serve(const ServedCaches& caches) {
+  Work work(*this, caches);
   while (true) {
     Inbox inbox;
     {
@@ -402,10 +412,19 @@ void RemoteViewer::loop() {
     try {
       work.serve(std::move(inbox));
     } catch (const std::exception& error) {  // such as a lack of memory: of this viewer alone
-      printMessage("warning: a viewer: {}", error.what());
-      send_(caches->errorText("the server could not do this; the reason is in its messages (standard error)"),
-            true);
+      reportFailure(error);
     }
+  }
+}
+
+void RemoteViewer::reportFailure(const std::exception& error) noexcept {
+  try {
+    printMessage("warning: a viewer: {}", error.what());
+    send_(ServedCaches::refusalText(
+              "the server could not do this; the reason is in its messages (standard error)"),
+          true);
+  } catch (const std::exception&) {
+    printMessage("warning: a viewer: too little memory");
   }
 }
 

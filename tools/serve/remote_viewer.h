@@ -33,6 +33,8 @@ struct ViewerLimits {
   double target_s = 0.04;             // to draw a picture while the camera moves
   Backend backend = Backend::kAutomatic;
   FacesAtStep faces_at = {};  // none: no faces are drawn
+  /// Throws Error if a viewer's pictures cannot have their threads: libraries that cannot start one may end the process.
+  std::function<void()> require_threads = [] {};
 };
 
 /// The address at which a server listens, and what it allows.
@@ -75,6 +77,8 @@ class RemoteViewer {
     bool woken = false;  // the frame loop has something
   };
   void loop();
+  void serve(const ServedCaches& caches);
+  void reportFailure(const std::exception& error) noexcept;
   void wake();
 
   ServedFolders& folders_;

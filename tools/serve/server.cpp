@@ -1,5 +1,6 @@
 #include "tools/serve/server.h"
 
+#include <atomic>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -8,6 +9,7 @@
 #include <chrono>
 #include <list>
 #include <memory>
+#include <new>
 #include <utility>
 
 #include "stream/base/error.h"
@@ -44,10 +46,13 @@ class ViewerCloser {
   ViewerCloser(const ViewerCloser&) = delete;
   ViewerCloser& operator=(const ViewerCloser&) = delete;
 
-  void end(std::unique_ptr<RemoteViewer> viewer) {
-    {
+  void end(std::unique_ptr<RemoteViewer> viewer) noexcept {
+    try {
       const MutexLock lock(mutex_);
       viewers_.push_back(std::move(viewer));
+    } catch (const std::bad_alloc&) {  // ends it here and waits for its picture
+      viewer.reset();
+      ended_();
     }
     changed_.notify_all();
   }
@@ -86,7 +91,7 @@ class Server : public ConnectionHost {
         acceptor_(io_),
         timer_(io_),
         pause_(io_),
-        closer_([this] { asio::post(io_, [this] { --viewers_; }); }) {
+        closer_([this] { --viewers_; }) {
     listen();
   }
 
@@ -113,10 +118,20 @@ class Server : public ConnectionHost {
     return fmt::format("http://{}:{}/?token={}", name, endpoint.port(), options_.token);
   }
 
+  /// An exception that leaves a handler, such as a lack of memory, ends that handler's connection, which then has no operation
+  /// pending. The server's own operations begin again.
   void run() {
-    accept();
-    lookForStop();
-    io_.run();
+    bool serves = true;
+    while (serves) {
+      if (!accepting_) accept();
+      if (!looking_) lookForStop();
+      try {
+        io_.run();
+        serves = false;
+      } catch (const std::exception& error) {
+        printMessage("warning: a connection: {}", error.what());
+      }
+    }
     stopped_.throwIfStopped();
   }
 
@@ -124,17 +139,19 @@ class Server : public ConnectionHost {
 
   std::unique_ptr<RemoteViewer> newViewer(const std::shared_ptr<Connection>& connection) override {
     if (viewers_ == options_.viewers) return nullptr;
-    ++viewers_;
+    options_.each.require_threads();
     std::weak_ptr<Connection> weak = connection;
-    return std::make_unique<RemoteViewer>(
+    auto viewer = std::make_unique<RemoteViewer>(
         folders_, options_.each, [this, weak = std::move(weak)](std::string message, bool is_text) {
           asio::post(io_, [weak, is_text, text = std::move(message)]() mutable {
-            if (const auto one = weak.lock()) one->send(std::move(text), is_text);
+            if (const auto one = weak.lock()) send(*one, std::move(text), is_text);
           });
         });
+    ++viewers_;
+    return viewer;
   }
 
-  void endViewer(std::unique_ptr<RemoteViewer> viewer) override { closer_.end(std::move(viewer)); }
+  void endViewer(std::unique_ptr<RemoteViewer> viewer) noexcept override { closer_.end(std::move(viewer)); }
 
  private:
   void listen() {
@@ -153,8 +170,19 @@ class Server : public ConnectionHost {
                   options_.address, options_.port, error.message());
   }
 
+  /// A page that lacks a message would wait for it.
+  static void send(Connection& connection, std::string message, bool is_text) {
+    try {
+      connection.send(std::move(message), is_text);
+    } catch (const std::bad_alloc&) {
+      connection.drop();
+      throw;
+    }
+  }
+
   void accept() {
     acceptor_.async_accept([this](const AsioError& error, tcp::socket socket) {
+      accepting_ = false;
       if (!acceptor_.is_open()) return;
       connections_.remove_if([](const auto& weak) { return weak.expired(); });
       // More than may be are not heard; those that wait for a viewer's end count as viewers.
@@ -167,14 +195,18 @@ class Server : public ConnectionHost {
       // With no descriptor left, for example, it fails again at once, until a connection ends.
       pause_.expires_after(kPauseAfterError);
       pause_.async_wait([this](const AsioError& stopped) {
+        accepting_ = false;
         if (!stopped) accept();
       });
+      accepting_ = true;
     });
+    accepting_ = true;
   }
 
   void lookForStop() {
     timer_.expires_after(kLookForStop);
     timer_.async_wait([this](const AsioError& error) {
+      looking_ = false;
       if (error) return;
       try {
         stopped_.throwIfStopped();
@@ -183,6 +215,7 @@ class Server : public ConnectionHost {
         io_.stop();
       }
     });
+    looking_ = true;
   }
 
   ServedFolders& folders_;
@@ -191,8 +224,10 @@ class Server : public ConnectionHost {
   asio::io_context io_{1};
   tcp::acceptor acceptor_;
   asio::steady_timer timer_, pause_;
+  bool accepting_ = false;  // or pausing, after which it accepts
+  bool looking_ = false;    // for a stop
   std::list<std::weak_ptr<Connection>> connections_;
-  size_t viewers_ = 0;  // with those that are ending
+  std::atomic<size_t> viewers_ = 0;  // with those that are ending; the closer lowers it
   ViewerCloser closer_;
 };
 

@@ -15,9 +15,9 @@ from ._arrays import Block, from_xarray
 from ._cache import Cache, Picture, Points, Samples, Scalar, open
 from ._camera import Camera, orbit
 from ._convert import Report, append, append_arrays, convert, convert_arrays, convert_callable
-from ._core import Error, UsageError, colour_maps
+from ._core import Error, UsageError
 from ._core import version as __version__
-from ._function import TransferFunction
+from ._function import TransferFunction, colour_maps
 from ._view import View, program
 
 __all__ = ["Block", "Cache", "Camera", "Error", "Picture", "Points", "Report", "Samples", "Scalar", "TransferFunction", "UsageError",

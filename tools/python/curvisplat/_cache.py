@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import pathlib
 import tempfile
@@ -81,8 +82,8 @@ class Picture(np.ndarray, metaclass=_ListsItsOwn):
     @_arguments.in_one_line
     def save(self, path: Union[str, os.PathLike]) -> None:
         """Writes the picture as .png (8 bits), .exr or .pfm (float32); .exr with the channels."""
-        of_exr = self.channels if os.fspath(path).lower().endswith(".exr") else {}
-        _core.write_image(np.ascontiguousarray(self, dtype=np.float32), os.fspath(path), of_exr)
+        name = _arguments.path("path", path)
+        _core.write_image(np.ascontiguousarray(self, dtype=np.float32), name, self.channels if name.lower().endswith(b".exr") else {})
 
     def _repr_png_(self) -> Optional[bytes]:
         """The picture for a notebook; None for an array that is no picture any more, such as one row or none."""
@@ -94,46 +95,13 @@ class Picture(np.ndarray, metaclass=_ListsItsOwn):
             return path.read_bytes()
 
 
-def _number(value: float) -> str:
-    return repr(float(value))
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return ",".join(_number(value) for value in values)
-
-
-def _isovalues(value: Any) -> Sequence[str]:
-    """Options of --iso: one for each value, or for each scalar of a dict."""
-    if isinstance(value, Mapping):
-        by_name = {name: _arguments.several(of_it, (int, float)) for name, of_it in value.items()}
-        return [f"{name}={_numbers(values)}" for name, values in by_name.items() if values]
-    return [_number(one) for one in _arguments.several(value, (int, float))]
-
-
-def _text(value: Any) -> str:
-    """A value as the command line writes it: numbers joined by commas, text as it is."""
-    if isinstance(value, str):
-        return value
-    return _number(value) if np.isscalar(value) else _numbers(value)
-
-
-def _opacities(value: Any) -> str:
-    if isinstance(value, str):
-        return value
-    return ",".join(f"{_number(position)}:{_number(opacity)}" for position, opacity in value)
-
-
-def _given(**options: Any) -> dict:
-    return {name: _text(value) for name, value in options.items() if value is not None}
-
-
 def _instead(whole: Any, name: str, **parts: Any) -> dict:
     """The options of a Camera or TransferFunction, or those given one by one."""
     kind = {"camera": Camera, "function": TransferFunction}[name]
     if whole is not None and not isinstance(whole, kind):
         instead = "colours" if name == "function" else "view"
-        raise _core.UsageError(f"{name}: {whole!r} is no {kind.__name__}; a name is passed as {instead}={whole!r}"
-                               if isinstance(whole, str) else f"{name}: expected a {kind.__name__}, not {type(whole).__name__}")
+        raise _core.UsageError(f"{name}: {_arguments.shown(whole)} is no {kind.__name__}"
+                               + (f"; a name is passed as {instead}={_arguments.shown(whole)}" if isinstance(whole, str) else ""))
     given = {part: value for part, value in parts.items() if value is not None}
     if whole is None:
         return given
@@ -143,27 +111,28 @@ def _instead(whole: Any, name: str, **parts: Any) -> dict:
 
 
 def _function_texts(colours: Any = None, opacity: Any = None, **others: Any) -> dict:
-    texts = _given(tf=None if colours is None else os.fspath(colours), **others)
+    texts = _arguments.given(**others)
+    if colours is not None:
+        texts["tf"] = _arguments.path("colours", colours)
     if opacity is not None:
-        texts["opacity"] = _opacities(opacity)
+        texts["opacity"] = _arguments.opacities("opacity", opacity)
     return texts
-
-
-def _level(level: Optional[int]) -> Optional[int]:
-    return None if level is None else _arguments.whole("level", level)
 
 
 class Cache:
     """A splat cache, open for drawing. One thread may draw at a time; `close()` or `with` gives its memory back."""
 
+    @_arguments.in_one_line
     def __init__(self, path: Union[str, os.PathLike], *, headers: Optional[Mapping[str, str]] = None,
                  folder: Union[str, os.PathLike, None] = None):
+        headers = _arguments.headers(headers)
+        parent = _arguments.maybe("folder", folder, _arguments.path)
         if _remote.is_address(path):
-            self._core = _remote.opened(_arguments.path(path), headers, folder)
+            self._core = _remote.opened(_arguments.text("path", path), headers, parent)
         elif headers is not None or folder is not None:
             raise _core.UsageError("headers and folder are for caches on a server, http://... or https://...")
         else:
-            self._core = _core.OpenCache(_arguments.path(path))
+            self._core = _core.OpenCache(_arguments.path("path", path))
 
     def __enter__(self) -> "Cache":
         return self
@@ -241,14 +210,17 @@ class Cache:
 
         scalar: a name (default: the first). range: (low, high), by default that of the scalar. log: intervals of equal
         width in the logarithm. Of the step that was drawn last, from a coarse level: fast for any cache."""
+        scalar = _arguments.text("scalar", scalar)
         of = next((s for s in self.scalars if not scalar or s.name == scalar), None)
-        low, high = range if range is not None else (of.min, of.max) if of else (0, 1)  # no such scalar: said below
+        low, high = (_arguments.numbers("range", range, "(low, high)", 2) if range is not None
+                     else (of.min, of.max) if of else (0, 1))  # no such scalar: said below
         if not low < high and range is None:
             low, high = low - 0.5, low + 0.5
         bins = _arguments.whole("bins", bins, 1)
-        shares = np.array(self._core.histogram(scalar, (float(low), float(high)), log, bins))
+        shares = np.array(self._core.histogram(scalar, (low, high), _arguments.flag("log", log), bins))
         return shares, np.geomspace(low, high, bins + 1) if log else np.linspace(low, high, bins + 1)
 
+    @_arguments.in_one_line
     def view(self, *, height: int = 600, program: Optional[str] = None) -> View:
         """The cache in a browser or a notebook, to move in: `curvisplat serve` on this machine. A notebook shows the result; its
         `url` is for a browser on this machine. It ends by `close()` or with the interpreter."""
@@ -268,14 +240,20 @@ class Cache:
         there (trilinear; of cell-centred scalars the cell's value), where the cache has rounded means. "position" and "sample_values" are then those of the
         nearest node itself, or of the cell, and points outside of the cells are outside.
         """
-        points = np.asarray(point, float) if np.ndim(point) == 2 else None
-        if points is None:
+        given = point if isinstance(point, (str, bytes)) else _arguments.array("point", point)
+        several = np.ndim(given) == 2
+        if several:
+            try:
+                points = given.astype(float)
+            except Exception:
+                raise _arguments.wrong("point", point, "numbers of shape (n, 3)") from None
+            if points.shape[1] != 3 or not np.isfinite(points).all():
+                raise _core.UsageError(f"point: points of shape {points.shape}: expected finite numbers of shape (n, 3)")
+        else:
             points = np.array([_arguments.numbers("point", point, "(x, y, z)", 3)])
-        elif points.shape[1] != 3 or not np.isfinite(points).all():
-            raise _core.UsageError(f"points of shape {points.shape}: expected finite numbers of shape (n, 3)")
-        files = None if source is None or source is False else [] if source is True else [_arguments.path(f) for f in source]
+        files = None if source is None or source is False else [] if source is True else _arguments.paths("source", source)
         values, block, index, position, sample_values = self._core.probe(points, files)
-        if np.ndim(point) != 2:
+        if not several:
             if block[0] == 0:
                 return None
             values, sample_values = ({name: float(v[0]) for name, v in of.items()} for of in (values, sample_values))
@@ -285,10 +263,8 @@ class Cache:
     def _box(self, box: Optional[Vector]) -> Tuple[list, list]:
         if box is None:
             return list(self._core.lower), list(self._core.upper)
-        values = [float(x) for x in box]
-        if len(values) != 6:
-            raise _core.UsageError(f"a box of {len(values)} numbers: expected (x0, x1, y0, y1, z0, z1)")
-        return values[0::2], values[1::2]
+        values = _arguments.numbers("box", box, "(x0, x1, y0, y1, z0, z1)", 6)
+        return list(values[0::2]), list(values[1::2])
 
     @_arguments.in_one_line
     def sample(self, scalar: str = "", *, size: Union[int, Tuple[int, int, int]] = 128, box: Optional[Vector] = None,
@@ -301,19 +277,21 @@ class Cache:
         Takes, besides what it returns, 64 MiB or a quarter of that; or a plane's 32 bytes a point where that is more.
         Raises UsageError for what makes no sense, Error if reading fails, KeyboardInterrupt after Ctrl-C.
         """
+        scalar = _arguments.text("scalar", scalar)
         lower, upper = self._box(box)
         extent = np.subtract(upper, lower)
         if isinstance(size, (int, np.integer)) and size > 0:
-            widest = max(float(extent.max()), 1e-300)
-            size = tuple(int(max(1, np.ceil(size * max(side, 0) / widest - 1e-6))) for side in extent)
-        if np.ndim(size) != 1 or len(size) != 3 or min(size) < 1:
-            raise _core.UsageError(f"a size of {size}: expected one number or three, above zero")
+            longest, widest = _arguments.whole("size", size), max(float(extent.max()), 1e-300)
+            size = tuple(int(max(1, np.ceil(longest * max(side, 0) / widest - 1e-6))) for side in extent)
+        if np.ndim(_arguments.array("size", size)) != 1 or len(size) != 3:
+            raise _arguments.wrong("size", size, "one number or three, above zero")
+        size = [_arguments.whole("size", n, 1) for n in size]
         spacing = extent / np.asarray(size)
         spacing[extent == 0] = spacing.max()
         middle, half = np.add(lower, upper) / 2, np.asarray(size) * spacing / 2
         corners = [np.where(extent == 0, middle + side * half, end) for side, end in ((-1, lower), (1, upper))]
-        choice = _core.DataChoice(scalar, *map(list, corners), _level(level), _arguments.whole("step", step))
-        value, density = self._core.sample(choice, [int(n) for n in size], progress)
+        choice = _core.DataChoice(scalar, *map(list, corners), _arguments.maybe("level", level, _arguments.whole), _arguments.whole("step", step))
+        value, density = self._core.sample(choice, size, progress)
         return Samples(value, density, corners[0] + spacing / 2, spacing)
 
     @_arguments.in_one_line
@@ -325,7 +303,9 @@ class Cache:
         this raises as, too.
         """
         lower, upper = self._box(box)
-        return Points(*self._core.points(_core.DataChoice(scalar, lower, upper, _level(level), _arguments.whole("step", step)), progress))
+        choice = _core.DataChoice(_arguments.text("scalar", scalar), lower, upper, _arguments.maybe("level", level, _arguments.whole),
+                                  _arguments.whole("step", step))
+        return Points(*self._core.points(choice, progress))
 
     @_arguments.in_one_line
     def camera(self, view: str = "iso", *, size: Tuple[int, int] = (600, 600), scale: Vector = (1, 1, 1),
@@ -340,10 +320,12 @@ class Cache:
               scale: Vector = (1, 1, 1), vertical_scale: Optional[float] = None,
               view_angle: Optional[float] = None) -> Sequence[Camera]:
         """The cameras of `curvisplat render --orbit`, one a frame, which all have all of the data in the picture."""
-        options = _given(view=view, view_angle=view_angle, orbit=degrees, vertical_scale=vertical_scale)
-        cameras = self._core.cameras(options, _arguments.picture_size(size), _numbers(scale),
+        angle = _arguments.maybe("view_angle", view_angle, _arguments.number)
+        options = _arguments.given(view=_arguments.text("view", view), view_angle=angle, orbit=_arguments.number("degrees", degrees),
+                                   vertical_scale=vertical_scale)
+        cameras = self._core.cameras(options, _arguments.picture_size(size), _arguments.option("scale", scale),
                                      _arguments.whole("frames", frames))
-        return [Camera(position, focal_point, view_up, None if view_angle else half, view_angle)
+        return [Camera(position, focal_point, view_up, None if angle else half, angle)
                 for position, focal_point, view_up, half in cameras]
 
     @_arguments.in_one_line
@@ -446,46 +428,52 @@ class Cache:
                              parallel_scale=parallel_scale, view_angle=view_angle, look_at=look_at, from_height=from_height)
         of_camera |= {name: value for name, value in (("azimuth", azimuth), ("elevation", elevation), ("roll", roll), ("zoom", zoom))
                       if value is not None}
-        of_two = _given(opacity_by=opacity_by or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh,
-                        opacity_tf=None if opacity_tf is None else os.fspath(opacity_tf))
-        frame = _given(size=_arguments.picture_size(size), classify=classify, time=time, background=background,
-                       scale=scale, vertical_scale=vertical_scale, memory=str(memory), card_memory=None if card_memory is None else str(card_memory),
-                       lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction, shadow=shadow, ambient_occlusion=ambient_occlusion,
-                       gradient_opacity=None if gradient_opacity is None else _opacities(gradient_opacity),
-                       max_splats=None if max_splats is None else str(max_splats),
-                       channels=",".join(_arguments.several(channels)) or "none",
-                       lines_time=None if lines_time is None else _text(lines_time), globe=globe,
-                       map=None if map is None else os.fspath(map), map_height=map_height,
-                       axes_titles=None if axes_titles is None else ",".join(axes_titles), title=title, label=label,
-                       text_size=None if text_size is None else _text(text_size))
-        others = {"clip_planes": _arguments.planes("clip_planes", clip_planes, _numbers),
-                  "step": None if step is None else _arguments.whole("step", step),
-                  "interpolate": _arguments.flag("interpolate", interpolate),
-                  "surfaces": [os.fspath(surface) for surface in _arguments.several(surfaces, (str, os.PathLike))],
-                  "surface_colours": _arguments.several(surface_colours), "surface_by": surface_by,
-                  "surface_opacity": [_text(value) for value in _arguments.several(surface_opacity, (str, int, float))],
-                  "lines": [os.fspath(path) for path in _arguments.several(lines, (str, os.PathLike))],
-                  "points": [os.fspath(path) for path in _arguments.several(points, (str, os.PathLike))],
-                  "lines_colour": _arguments.several(lines_colour), "lines_by": lines_by, "line_width": _text(line_width),
-                  "point_size": _text(point_size), "lines_opacity": _text(lines_opacity),
-                  "slices": _arguments.planes("slices", slices, _numbers), "slice_opacity": _text(slice_opacity),
-                  "isovalues": _isovalues(isovalues), "iso_by": iso_by,
-                  "iso_colour": _arguments.several(iso_colour),
-                  "volume": _arguments.flag("volume", volume), "shade": _arguments.flag("shade", shade),
-                  "threads": _arguments.whole("threads", threads),
-                  "keep_going": _arguments.flag("keep_going", keep_going), "backend": backend,
-                  "scalar_bar": _arguments.flag("scalar_bar", scalar_bar),
-                  "scalar_bar_titles": _arguments.several(scalar_bar_titles), "axes": _arguments.flag("axes", axes),
-                  "axes_grid": _arguments.flag("axes_grid", axes_grid), "outline": _arguments.flag("outline", outline),
-                  "markers": _arguments.markers(markers, _numbers)}
+        given, texts, paths, flag = _arguments.given, _arguments.texts, _arguments.paths, _arguments.flag
+        of_two = given(opacity_by=_arguments.text("opacity_by", opacity_by) or None, opacity_range=opacity_range, opacity_asinh=opacity_asinh)
+        if opacity_tf is not None:
+            of_two["opacity_tf"] = _arguments.path("opacity_tf", opacity_tf)
+        # None is an error here, unlike for the options below.
+        frame = {"size": _arguments.picture_size(size), "classify": _arguments.text("classify", classify),
+                 "background": _arguments.text("background", background), "scale": _arguments.option("scale", scale),
+                 "memory": _arguments.amount("memory", memory), "lod_pixels": _arguments.option("lod_pixels", lod_pixels),
+                 "channels": ",".join(texts("channels", channels)) or "none",
+                 **given(time=time, vertical_scale=vertical_scale, clip_box=clip_box, light=light, light_direction=light_direction,
+                         shadow=shadow, ambient_occlusion=ambient_occlusion, lines_time=lines_time, globe=globe, map_height=map_height,
+                         text_size=text_size)}
+        for name, value, kind in (("card_memory", card_memory, _arguments.amount), ("max_splats", max_splats, _arguments.amount),
+                                  ("gradient_opacity", gradient_opacity, _arguments.opacities), ("map", map, _arguments.path),
+                                  ("title", title, _arguments.text), ("label", label, _arguments.text)):
+            if value is not None:
+                frame[name] = kind(name, value)
+        if axes_titles is not None:
+            frame["axes_titles"] = ",".join(texts("axes_titles", axes_titles))
+        others = {"clip_planes": _arguments.planes("clip_planes", clip_planes),
+                  "step": _arguments.maybe("step", step, _arguments.whole),
+                  "interpolate": flag("interpolate", interpolate),
+                  "surfaces": paths("surfaces", surfaces),
+                  "surface_colours": texts("surface_colours", surface_colours), "surface_by": _arguments.text("surface_by", surface_by),
+                  "surface_opacity": _arguments.several("surface_opacity", surface_opacity, _arguments.option, (str, int, float, np.number)),
+                  "lines": paths("lines", lines), "points": paths("points", points),
+                  "lines_colour": texts("lines_colour", lines_colour), "lines_by": _arguments.text("lines_by", lines_by),
+                  "line_width": _arguments.option("line_width", line_width), "point_size": _arguments.option("point_size", point_size),
+                  "lines_opacity": _arguments.option("lines_opacity", lines_opacity),
+                  "slices": _arguments.planes("slices", slices), "slice_opacity": _arguments.option("slice_opacity", slice_opacity),
+                  "isovalues": _arguments.isovalues(isovalues), "iso_by": _arguments.text("iso_by", iso_by),
+                  "iso_colour": texts("iso_colour", iso_colour),
+                  "volume": flag("volume", volume), "shade": flag("shade", shade), "threads": _arguments.whole("threads", threads),
+                  "keep_going": flag("keep_going", keep_going), "backend": _arguments.text("backend", backend),
+                  "scalar_bar": flag("scalar_bar", scalar_bar), "scalar_bar_titles": texts("scalar_bar_titles", scalar_bar_titles),
+                  "axes": flag("axes", axes), "axes_grid": flag("axes_grid", axes_grid), "outline": flag("outline", outline),
+                  "markers": _arguments.markers(markers)}
         if iso_opacity is not None:
-            others["iso_opacity"] = _text(iso_opacity)
-        rgba, *about = self._core.render({"scalar": scalar, **_function_texts(**of_function), **of_two}, _given(**of_camera), frame,
-                                         others, progress)
+            others["iso_opacity"] = _arguments.option("iso_opacity", iso_opacity)
+        rgba, *about = self._core.render({"scalar": _arguments.text("scalar", scalar), **_function_texts(**of_function), **of_two},
+                                         given(**of_camera), frame, others, progress)
         picture = rgba.view(Picture)
         picture.options, picture.notes, picture.warnings, picture.channels, picture.statistics = about
+        picture.warnings = [_arguments.with_own_names(warning, inspect.signature(Cache.render).parameters) for warning in picture.warnings]
         for warning in picture.warnings:
-            warnings.warn(warning, stacklevel=2)
+            warnings.warn(warning, stacklevel=3)  # where in_one_line() is called
         return picture
 
 

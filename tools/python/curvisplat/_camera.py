@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import List, Optional, Tuple
 
-from . import _core
+from . import _arguments, _core
 
 Point = Tuple[float, float, float]
+_MOST_FRAMES = 100_000  # as of `curvisplat render --frames`
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,16 +28,16 @@ class Camera:
 
     def __post_init__(self) -> None:
         for name in ("position", "focal_point", "view_up"):
-            values = tuple(float(x) for x in getattr(self, name))
-            if len(values) != 3:
-                raise _core.UsageError(f"{name}: has {len(values)} numbers, expected three")
-            object.__setattr__(self, name, values)
+            object.__setattr__(self, name, _arguments.numbers(name, getattr(self, name), "(x, y, z)", 3))
+        for name in ("parallel_scale", "view_angle"):
+            object.__setattr__(self, name, _arguments.maybe(name, getattr(self, name), _arguments.number))
         if self.parallel_scale is not None and self.view_angle is not None:
             raise _core.UsageError("a camera has parallel_scale or view_angle, not both")
 
+    @_arguments.in_one_line
     def turned(self, degrees: float) -> "Camera":
         """The camera after so many degrees around `view_up` through the focal point, anticlockwise seen from above."""
-        position, view_up = _core.orbited(self.position, self.focal_point, self.view_up, float(degrees))
+        position, view_up = _core.orbited(self.position, self.focal_point, self.view_up, _arguments.number("degrees", degrees))
         return dataclasses.replace(self, position=position, view_up=view_up)
 
     def options(self) -> dict:
@@ -44,11 +45,15 @@ class Camera:
         return {name: value for name, value in vars(self).items() if value is not None}
 
 
+@_arguments.in_one_line
 def orbit(camera: Camera, frames: int = 90, degrees: float = 360) -> List[Camera]:
     """`frames` cameras around the focal point, as `--orbit` has them: 360 degrees are a loop without its last frame twice.
 
     Give the camera a parallel_scale or a view_angle, or each frame is fitted to the data by itself; Cache.camera() has one.
     """
-    if int(frames) < 1:
-        raise _core.UsageError(f"an orbit of {frames} frames: expected one or more")
-    return [camera.turned(float(degrees) * frame / int(frames)) for frame in range(int(frames))]
+    if not isinstance(camera, Camera):
+        raise _arguments.wrong("camera", camera, "a Camera")
+    count, whole = _arguments.whole("frames", frames, 1), _arguments.number("degrees", degrees)
+    if count > _MOST_FRAMES:
+        raise _core.UsageError(f"frames: {count}; expected at most {_MOST_FRAMES}")
+    return [camera.turned(whole * frame / count) for frame in range(count)]

@@ -35,8 +35,9 @@ class Report(NamedTuple):
 def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory: Union[str, int, None], threads: int,
              title: str) -> dict:
     return {"overwrite": _arguments.flag("overwrite", overwrite), "resume": _arguments.flag("resume", resume),
-            "blank_value": blank_value, "threads": _arguments.whole("threads", threads), "title": _arguments.text("title", title),
-            "memory": "" if memory is None else str(memory), "value_precision": "auto"}
+            "blank_value": _arguments.maybe("blank_value", blank_value, _arguments.number),
+            "threads": _arguments.whole("threads", threads), "title": _arguments.text("title", title),
+            "memory": _arguments.maybe("memory", memory, _arguments.amount) or "", "value_precision": "auto"}
 
 
 @_arguments.in_one_line
@@ -62,7 +63,7 @@ def convert(output: Path, grid: Path, solutions: Union[Path, Sequence[Path]] = (
     and of a series the steps so far.
     """
     options = _options(overwrite, resume, blank_value, memory, threads, title)
-    options["value_precision"] = value_precision
+    options["value_precision"] = _arguments.text("value_precision", value_precision)
     options["refine"] = _arguments.refinement(refine)
     return _convert_files(output, grid, solutions, scalars, options, time_step=time_step, steps=steps, keep_going=keep_going,
                           vertical_scale=vertical_scale, select=select, progress=progress)
@@ -82,16 +83,13 @@ def _convert_files(output: Path, grid: Path, solutions: Any, scalars: Any, optio
                    add: bool = False, time_step: Optional[int] = None, steps: Optional[str] = None, keep_going: bool = False,
                    vertical_scale: float = 1, select: Optional[Mapping[str, float]] = None) -> Report:
     options["add"] = add
-    options["time_step"] = None if time_step is None else _arguments.whole("time_step", time_step)
-    options["steps"] = None if steps is None else str(steps)
+    options["time_step"] = _arguments.maybe("time_step", time_step, _arguments.whole)
+    options["steps"] = _arguments.maybe("steps", steps, _arguments.amount)
     options["keep_going"] = _arguments.flag("keep_going", keep_going)
-    options["vertical_scale"] = _arguments.numbers("vertical_scale", (vertical_scale,), "a number", 1)[0]
-    if select is not None and not isinstance(select, Mapping):
-        raise _core.UsageError('select: expected values by dimension, such as {"month": 3}')
-    options["select"] = [f"{dimension}={value}" for dimension, value in (select or {}).items()]
-    files = [_arguments.path(path) for path in _arguments.several(solutions, (str, os.PathLike))]
-    names = [_arguments.text("scalars", name) for name in _arguments.several(scalars)]
-    return Report(**_core.convert_files(_arguments.path(output), _arguments.path(grid), files, names, options, progress))
+    options["vertical_scale"] = _arguments.number("vertical_scale", vertical_scale)
+    options["select"] = _arguments.selection(select)
+    return Report(**_core.convert_files(_arguments.path("cache" if add else "output", output), _arguments.path("grid", grid),
+                                        _arguments.paths("solutions", solutions), _arguments.texts("scalars", scalars), options, progress))
 
 
 def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
@@ -100,7 +98,10 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
         raise _core.UsageError("no block to convert; pass one Block or more")
     for block in blocks:
         if not isinstance(block, Block):
-            raise _core.UsageError(f"{type(block).__name__} is no Block; make one by Block() or from_xarray()")
+            raise _core.UsageError(f"blocks: {type(block).__name__} is no Block; make one by Block() or from_xarray()")
+        for what in ("scalars", "units"):
+            if not isinstance(getattr(block, what), Mapping):
+                raise _arguments.wrong(what, getattr(block, what), "a dict by name")
     names = list(blocks[0].scalars)
     units = [(_arguments.text("scalars", name), _arguments.text("units", blocks[0].units.get(name, ""))) for name in names]
     tuples = []
@@ -109,11 +110,12 @@ def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
         missing = [scalar for scalar in names if scalar not in block.scalars]
         if missing:
             raise _core.UsageError(f"{name}: has no scalar '{missing[0]}', which the first block has")
-        blank = None if block.blank is None else np.asarray(block.blank)
+        blank = None if block.blank is None else _arguments.array("blank", block.blank)
         if blank is not None and blank.dtype != np.bool_:
             raise _core.UsageError(f"{name}: blank: its values are {blank.dtype}; expected bool, True where a node is not there")
-        values = [_values(block.scalars[scalar]) for scalar in names]
-        tuples.append((name, np.asarray(block.x), np.asarray(block.y), np.asarray(block.z), values, blank))
+        values = [_values(scalar, block.scalars[scalar]) for scalar in names]
+        x, y, z = (_arguments.array(axis, getattr(block, axis)) for axis in "xyz")
+        tuples.append((name, x, y, z, values, blank))
     return tuples, units
 
 
@@ -128,10 +130,10 @@ def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = 
     """
     tuples, units = _tuples(blocks)
     options = _options(overwrite, False, blank_value, memory, threads, title)
-    options["value_precision"] = value_precision
+    options["value_precision"] = _arguments.text("value_precision", value_precision)
     options["refine"] = _arguments.refinement(refine)
-    options["time"] = None if time is None else float(time)
-    return Report(**_core.convert_arrays(_arguments.path(output), tuples, units, options, progress))
+    options["time"] = _arguments.maybe("time", time, _arguments.number)
+    return Report(**_core.convert_arrays(_arguments.path("output", output), tuples, units, options, progress))
 
 
 @_arguments.in_one_line
@@ -144,8 +146,8 @@ def append_arrays(cache: Path, *blocks: Block, time: Optional[float] = None, bla
     """
     tuples, units = _tuples(blocks)
     options = _options(False, False, blank_value, memory, threads, "")
-    options["time"] = None if time is None else float(time)
-    return _core.append_arrays(_arguments.path(cache), tuples, units, options, progress)
+    options["time"] = _arguments.maybe("time", time, _arguments.number)
+    return _core.append_arrays(_arguments.path("cache", cache), tuples, units, options, progress)
 
 
 def _takes_parts_of_rows(read: Callable[..., Any]) -> bool:
@@ -168,11 +170,13 @@ def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read:
     called three times for each piece, and first for its coordinates unless `refine` is a number, in any thread, one call at a time. refine: as in convert(). Raises as convert() does,
     and what `read` raises.
     """
-    units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in scalars]
-    units = [(_arguments.text("scalars", name), _arguments.text("units", unit)) for name, unit in units]
+    units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in _arguments.texts("scalars", scalars)]
+    units = [(_arguments.text("scalars", name), _arguments.text("scalars", unit)) for name, unit in units]
     options = _options(overwrite, False, blank_value, memory, threads, title)
-    options["value_precision"] = value_precision
+    options["value_precision"] = _arguments.text("value_precision", value_precision)
     options["refine"] = _arguments.refinement(refine)
+    if not callable(read):
+        raise _arguments.wrong("read", read, "a function")
     options["parts_of_rows"] = _takes_parts_of_rows(read)
-    return Report(**_core.convert_callable(_arguments.path(output), [_arguments.shape(shape) for shape in shapes], units, read,
-                                           options, progress))
+    blocks = [_arguments.shape(shape) for shape in _arguments.items("shapes", shapes, "(nk, nj, ni) of each block, in a list")]
+    return Report(**_core.convert_callable(_arguments.path("output", output), blocks, units, read, options, progress))

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any, Optional, Sequence, Tuple, Union
+from typing import Any, List, Optional, Sequence, Tuple, Union
+
+from . import _core
+
+
+def colour_maps() -> List[str]:
+    """The names of the colour maps, as `curvisplat colormaps` lists them."""
+    return _core.colour_maps()
 
 
 @dataclasses.dataclass(frozen=True)

@@ -49,7 +49,7 @@ class _Connections:
     """Connections to servers, kept from one request to the next. Any thread."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # what handles a signal may use it, too
         self._idle: Dict[Tuple[str, str], List[http.client.HTTPConnection]] = {}
         self._in_use: Set[http.client.HTTPConnection] = set()
 
@@ -118,7 +118,7 @@ class Remote:
         self._tags: Dict[str, Tuple[int, Optional[str]]] = {}  # size and tag of each file, as they were first sent
         self._connections = _Connections()
         self._stop = threading.Event()
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # what handles a signal may use it, too
         self._threads: List[int] = []  # those that are in call()
         self._failure: Optional[BaseException] = None
         self._folder = ""  # in which the files are known to the module
@@ -297,6 +297,15 @@ _remotes: "weakref.WeakSet[Remote]" = weakref.WeakSet()
 def _interrupt() -> None:
     for remote in list(_remotes):
         remote.interrupt()
+
+
+def _forked() -> None:
+    """Another thread may have held a lock, and is not in the new process."""
+    for remote in list(_remotes):
+        remote._lock = threading.RLock()
+
+
+os.register_at_fork(after_in_child=_forked)
 
 
 def opened(url: str, headers: Optional[Mapping[str, str]], folder: Union[str, os.PathLike, None]) -> RemoteCore:

@@ -12,7 +12,7 @@ import tempfile
 import weakref
 from typing import Any, Optional
 
-from . import _core
+from . import _arguments, _core
 
 
 def program() -> str:
@@ -46,9 +46,11 @@ def _end(process: subprocess.Popen) -> None:
 class View:
     """A running server. A notebook shows its page; `url` opens it in a browser on this machine."""
 
+    @_arguments.in_one_line
     def __init__(self, path: str, height: int = 600, program: Optional[str] = None):
-        self.height = int(height)
-        command = [program or _default_program(), "serve", path, "--port", "0"]
+        self.height = _arguments.whole("height", height, 1)
+        own_program = _arguments.maybe("program", program, _arguments.path)
+        command = [os.fsdecode(own_program or _default_program()), "serve", os.fsdecode(_arguments.path("path", path)), "--port", "0"]
         with tempfile.TemporaryFile("w+") as messages:  # of its start; nobody reads later ones
             try:
                 # A session of its own: Ctrl-C in the interpreter is not meant for it.
