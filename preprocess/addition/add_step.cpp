@@ -30,6 +30,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_update.h"
 #include "stream/cache/faces_file.h"
+#include "stream/cache/partial_folder.h"
 #include "stream/cache/values_writer.h"
 
 namespace curvisplat {
@@ -254,7 +255,7 @@ class StepAddition {
     options.output = options_.cache / geometryFolderName(cache_.series().geometries());
     // A kill between the two steps below leaves a geometry that the series does not have.
     ConversionWorkspace::clearKilled(options.output);
-    if (std::filesystem::exists(options.output)) removeAll(options.output);
+    requireCacheFolderRemoved(options.output);
     options.check_disk_space = options_.check_disk_space;
     options.resume = options_.resume;
     options.overwrite = !options_.resume;

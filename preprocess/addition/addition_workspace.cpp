@@ -105,7 +105,7 @@ std::filesystem::path newScratch(const std::filesystem::path& cache, const std::
   const std::string name = scratchName(cache);
   // The cache is locked, so none of the additions that these belong to lives.
   for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (entry.path().filename().string().starts_with(name + ".")) removeAll(entry.path());
+    if (ScratchFolder::isOne(entry.path(), name)) removeAll(entry.path());
   return ScratchFolder::newPath(folder, name);
 }
 

@@ -82,7 +82,7 @@ DrawnNodes::DrawnNodes(const CacheReader& cache, const MemoryPlan& plan,
 }
 
 DrawnNodes::~DrawnNodes() {
-  removeAll(written_.path());
+  removeFileIfThere(written_.path());
 }
 
 bool DrawnNodes::holds(uint64_t node) const {

@@ -257,7 +257,7 @@ void makePartsFolder(const fs::path& folder) {
 }
 
 void removePartRecord(const fs::path& folder, const SeriesPart& part) {
-  if (const auto failure = removeAll(recordPath(folder, part)))
+  if (const auto failure = removeFileIfThere(recordPath(folder, part)))
     throw Error("{}: cannot be removed: {}", recordPath(folder, part).string(), failure.message());
 }
 

@@ -13,6 +13,7 @@
 #include "stream/cache/cache_index.h"
 #include "stream/cache/cache_update.h"
 #include "stream/cache/faces_file.h"
+#include "stream/cache/partial_folder.h"
 #include "stream/cache/series.h"
 #include "stream/cache/values_writer.h"
 
@@ -56,7 +57,8 @@ class NewNames {
   NewNames(const CacheLock& lock, const Progress& progress) : lock_(lock), progress_(progress) {}
   ~NewNames() {
     if (!lock_.isStillThere()) return;
-    for (const fs::path& path : paths_) removeAll(path);
+    for (const fs::path& path : paths_) removeFileIfThere(path);
+    if (!folder_.empty()) removeCacheFolder(folder_);
   }
   void add(const fs::path& from, const fs::path& to) {
     progress_.throwIfStopped();
@@ -66,25 +68,31 @@ class NewNames {
   }
   void addFolder(const fs::path& path) {
     lock_.requireStillThere();
-    removeAll(path);  // a killed program's
-    paths_.push_back(path);
+    requireCacheFolderRemoved(path);  // a killed program's
     makeFolder(path);
+    folder_ = path;
   }
   /// Keeps the names if `put` puts them into the series' manifest, or says that a power loss may undo that.
   void keepIf(const std::function<void()>& put) {
     try {
       put();
     } catch (const NameNotSynced&) {
-      paths_.clear();
+      keep();
       throw;
     }
-    paths_.clear();
+    keep();
   }
 
  private:
   const CacheLock& lock_;
   const Progress& progress_;
-  std::vector<fs::path> paths_;
+  void keep() {
+    paths_.clear();
+    folder_.clear();
+  }
+
+  std::vector<fs::path> paths_;  // of files
+  fs::path folder_;
 };
 
 /// See takeStep().
@@ -257,14 +265,14 @@ bool takeStep(const CacheLock& lock, const PartStep& step, const Progress& progr
 }
 
 void linkOrCopy(const fs::path& from, const fs::path& to, const Progress& progress) {
-  removeAll(to);
+  removeFileIfThere(to);
   std::error_code no_links;
   fs::create_hard_link(from, to, no_links);
   if (!no_links) return;
   try {
     copyDurably(from, to, progress);
   } catch (...) {
-    removeAll(to);
+    removeFileIfThere(to);
     throw;
   }
 }

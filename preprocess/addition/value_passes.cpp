@@ -151,7 +151,7 @@ std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryP
   const std::vector<IndexPlane> planes = planesOf(job.cache);
   plan.requireFaces(memoryOfFaces(job.reader.source().description(), planes));
   const std::filesystem::path output = job.cache.cachePath() / job.name;
-  removeAll(output);  // a killed program's
+  removeFileIfThere(output);  // a killed program's
   try {
     return writeGridFaces(job.reader,
                           {output, job.scratch, job.cache.manifest().lower, job.cache.manifest().upper,
@@ -159,7 +159,7 @@ std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryP
                           plan.slab_bytes, progress)
         .faces;
   } catch (...) {
-    removeAll(output);
+    removeFileIfThere(output);
     throw;
   }
 }

@@ -253,7 +253,7 @@ BucketFile::~BucketFile() {
   const std::filesystem::path path = state_->path;
   const bool leave = state_->leave;
   state_.reset();
-  if (!leave) removeAll(path);
+  if (!leave) removeFileIfThere(path);
 }
 
 void BucketFile::leave() {

@@ -349,7 +349,9 @@ void writeJournal(const std::filesystem::path& folder, const ConversionJournal& 
 }
 
 std::optional<ConversionJournal> readJournal(const std::filesystem::path& folder) {
-  if (!std::filesystem::exists(folder / kJournalName)) return std::nullopt;
+  std::error_code error;  // a folder or a link of this name is the user's
+  if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(folder / kJournalName, error)))
+    return std::nullopt;
   return journalFrom(readTextFile(folder / kJournalName, kLargestJournal));
 }
 

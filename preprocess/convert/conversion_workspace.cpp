@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <regex>
 #include <set>
 #include <string>
 #include <utility>
@@ -26,6 +27,14 @@ std::string ScratchFolder::beginOfName(const std::filesystem::path& cache) {
 std::filesystem::path ScratchFolder::newPath(const std::filesystem::path& parent, const std::string& name) {
   static std::atomic<unsigned> made = 0;  // several conversions in one process, as in tests
   return parent / fmt::format("{}.{}.{}", name, ::getpid(), made++);
+}
+
+bool ScratchFolder::isOne(const std::filesystem::path& path, const std::string& name) {
+  static const std::regex rest(R"(\.\d+\.\d+)");
+  const std::string found = path.filename().string();
+  std::error_code ignored;
+  return found.starts_with(name) && std::regex_match(found.substr(name.size()), rest) &&
+         std::filesystem::is_directory(std::filesystem::symlink_status(path, ignored));
 }
 
 ScratchFolder::ScratchFolder(std::filesystem::path path, Folder folder) : path_(std::move(path)) {
@@ -85,9 +94,7 @@ std::string scratchName(const fs::path& output) {
 /// Whether what the journal names can be the folder of temporary files of a conversion to `output`, in which
 /// files may be removed.
 bool isScratch(const fs::path& folder, const fs::path& output) {
-  std::error_code ignored;
-  return folder.filename().string().starts_with(scratchName(output) + ".") &&
-         fs::is_directory(fs::symlink_status(folder, ignored));
+  return ScratchFolder::isOne(folder, scratchName(output));
 }
 
 /// Removes the temporary files of a dead conversion to `output`; whatever else the journal may name stays.
@@ -189,7 +196,7 @@ bool ConversionWorkspace::leaveForResuming() {
 
 void ConversionWorkspace::clearFinished() {
   scratch_.reset();
-  removeAll(partial_->target() / kJournalName);
+  removeFileIfThere(partial_->target() / kJournalName);
 }
 
 ConversionWorkspace::~ConversionWorkspace() {
@@ -205,7 +212,7 @@ std::optional<std::vector<ConversionFact>> ConversionWorkspace::clearKilled(cons
   if (readJournal(replaced.path())) return std::nullopt;
   replaced.clear();
   removeScratch(*journal, output);
-  for (const char* name : {kBrickLogName, kPartialLock, kJournalName}) removeAll(output / name);
+  for (const char* name : {kBrickLogName, kPartialLock, kJournalName}) removeFileIfThere(output / name);
   return std::move(journal->facts);
 }
 

@@ -42,6 +42,8 @@ class ScratchFolder {
   static std::string beginOfName(const std::filesystem::path& cache);
   /// A name that no other process uses: `parent`/`name`.<process number>.<n>
   static std::filesystem::path newPath(const std::filesystem::path& parent, const std::string& name);
+  /// Whether `path` is a folder, and not a link, that newPath() has named from `name`.
+  static bool isOne(const std::filesystem::path& path, const std::string& name);
 
   enum class Folder { kMake, kTakeOver };
   /// Makes the folder, which must not exist, or takes over one that was left. Throws Error if it cannot.

@@ -59,7 +59,7 @@ TemporaryFile::TemporaryFile(fs::path target) : target_(std::move(target)) {
 }
 
 TemporaryFile::~TemporaryFile() {
-  if (!in_place_) removeAll(path_);
+  if (!in_place_) removeFileIfThere(path_);
   SystemCalls::current().close(fd_);
 }
 

@@ -311,7 +311,7 @@ void writeFileAtomically(const std::filesystem::path& path, std::span<const std:
     if (SystemCalls::current().rename(temporary.c_str(), path.c_str()) < 0)
       failToRename(errno, temporary, path);
   } catch (...) {
-    removeAll(temporary);
+    removeFileIfThere(temporary);
     throw;
   }
 }
@@ -354,6 +354,14 @@ void makeFolder(const std::filesystem::path& path, unsigned mode) {
 void removeFile(const std::filesystem::path& path) {
   if (SystemCalls::current().remove(path.c_str()) < 0)
     throw OutputError("{}: cannot be removed: {}", path.string(), reason());
+}
+
+std::error_code removeFileIfThere(const std::filesystem::path& path) noexcept {
+  std::error_code error;
+  if (std::filesystem::is_directory(std::filesystem::symlink_status(path, error)))
+    return std::make_error_code(std::errc::is_a_directory);
+  if (SystemCalls::current().remove(path.c_str()) == 0 || errno == ENOENT) return {};
+  return {errno, std::generic_category()};
 }
 
 std::error_code removeAll(const std::filesystem::path& path) noexcept {

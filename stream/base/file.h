@@ -182,6 +182,9 @@ void makeFolder(const std::filesystem::path& path, unsigned mode = 0777);
 void makePrivateFolders(const std::filesystem::path& path);
 /// Removes a file or an empty folder. Throws Error, also if the name does not exist.
 void removeFile(const std::filesystem::path& path);
+/// Removes a file or a link, if there is one of this name, and returns why it could not. A folder is left: where this program
+/// makes a file of the name, a folder is the user's.
+std::error_code removeFileIfThere(const std::filesystem::path& path) noexcept;
 /// Removes a file, or a folder and everything in it, and continues past failures. Returns the first failure.
 /// A name that does not exist is not a failure.
 std::error_code removeAll(const std::filesystem::path& path) noexcept;

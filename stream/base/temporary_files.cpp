@@ -135,7 +135,7 @@ OutputFile create(const std::filesystem::path& folder) {
     return out;
   } catch (...) {
     SystemCalls::current().close(file.fd);
-    removeAll(file.path);
+    removeFileIfThere(file.path);
     throw;
   }
 }
@@ -146,7 +146,7 @@ InputFile openWithoutName(const std::filesystem::path& path) {
     removeFile(path);
     return in;
   } catch (...) {
-    removeAll(path);
+    removeFileIfThere(path);
     throw;
   }
 }

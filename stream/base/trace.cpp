@@ -83,7 +83,7 @@ class TraceFile {
   void close() {
     append("\n]\n");
     if (!failure_) return file_.close();
-    removeAll(file_.path());  // it has no end
+    removeFileIfThere(file_.path());  // it has no end
     throw Error("{}", *failure_);
   }
 

@@ -104,7 +104,7 @@ void replaceManifest(const std::filesystem::path& cache, const Manifest& manifes
   } catch (const NameNotSynced&) {
     throw;
   } catch (...) {
-    removeAll(part);
+    removeFileIfThere(part);
     throw;
   }
 }

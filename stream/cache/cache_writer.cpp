@@ -302,7 +302,7 @@ Manifest CacheWriter::finish(Manifest manifest) {
   manifest.files.insert(manifest.files.end(), further.begin(), further.end());
   writeFileAtomically(s.folder.path() / "manifest.json", manifest.toJson());
   s.folder.putIntoPlace();
-  removeAll(s.folder.target() / kBrickLogName);
+  removeFileIfThere(s.folder.target() / kBrickLogName);
   s.folder.removeReplaced();
   return manifest;
 }

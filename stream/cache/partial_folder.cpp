@@ -5,6 +5,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -86,16 +88,22 @@ void addForeignNames(const fs::path& folder, const fs::path& place, std::vector<
   }
 }
 
-/// Moves what a user has put into `old` into `target`, for ever.
+/// `path`, or the first of PATH.1, PATH.2, ... if there is something of this name.
+fs::path freeName(const fs::path& path) {
+  std::error_code error;
+  fs::path name = path;
+  for (unsigned n = 1; fs::exists(fs::symlink_status(name, error)); ++n)
+    name = withSuffix(path, fmt::format(".{}", n).c_str());
+  return name;
+}
+
+/// Moves what a user has put into `old` into `target`, for ever. Names that are taken there get a number.
 void moveForeign(const fs::path& old, const fs::path& target) {
   const std::vector<fs::path> names = foreignNames(old);
   for (const fs::path& name : names) {
     std::error_code error;
     const bool has_place = fs::is_directory(target / name.parent_path(), error);
-    const fs::path from = old / name, to = target / (has_place ? name : name.filename());
-    if (fs::exists(fs::symlink_status(to, error)))
-      throw OutputError("{}: is not the cache's and not removed, and {} exists: move it elsewhere",
-                        from.string(), to.string());
+    const fs::path from = old / name, to = freeName(target / (has_place ? name : name.filename()));
     if (SystemCalls::current().rename(from.c_str(), to.c_str()) < 0) failToRename(errno, from, to);
   }
   if (!names.empty()) syncDirectory(target);
@@ -172,6 +180,28 @@ std::vector<fs::path> foreignNames(const fs::path& cache) {
   addForeignNames(cache, {}, names);
   std::sort(names.begin(), names.end());
   return names;
+}
+
+std::error_code removeCacheFolder(const fs::path& folder) noexcept {
+  try {
+    std::error_code error;
+    const fs::file_status status = fs::symlink_status(folder, error);
+    if (status.type() == fs::file_type::not_found) return {};
+    if (error) return error;
+    if (!fs::is_directory(status)) return std::make_error_code(std::errc::not_a_directory);
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+      if (isCacheFile(*entry)) removeFileIfThere(entry->path());
+    if (SystemCalls::current().remove(folder.c_str()) < 0) return {errno, std::generic_category()};
+    return {};
+  } catch (const std::exception&) {
+    return std::make_error_code(std::errc::not_enough_memory);
+  }
+}
+
+void requireCacheFolderRemoved(const fs::path& folder) {
+  if (const std::error_code error = removeCacheFolder(folder))
+    throw OutputError("{}: is not the cache's, and in the way of its next folder: move it elsewhere ({})",
+                      folder.string(), error.message());
 }
 
 bool hasUnfinished(const fs::path& target) {
@@ -308,7 +338,7 @@ void PartialFolder::putIntoPlace() {
   // The old cache, which is to be removed, is marked with it.
   if (replaced_ != path_ ||
       calls.rename((target_ / kPartialLock).c_str(), (path_ / kPartialLock).c_str()) < 0)
-    removeAll(target_ / kPartialLock);
+    removeFileIfThere(target_ / kPartialLock);
   calls.close(lock);
 }
 

@@ -20,6 +20,7 @@
 #include <filesystem>
 #include <functional>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "stream/base/file.h"
@@ -40,6 +41,12 @@ bool isCacheFile(const std::filesystem::directory_entry& entry);
 /// The names in a cache's folder, and in its folders of geometries, that are not the program's: what a user has
 /// put there. Relative to `cache`, sorted.
 std::vector<std::filesystem::path> foreignNames(const std::filesystem::path& cache);
+
+/// Removes the files that isCacheFile() from a folder in a cache, and then the folder; does nothing if there is none of this name.
+/// What a user has put there stays, and with it the folder: returns why it could not be removed. A link is not followed, and stays.
+std::error_code removeCacheFolder(const std::filesystem::path& folder) noexcept;
+/// The same; throws OutputError where a part of the folder stays, since the program is about to make one of this name.
+void requireCacheFolderRemoved(const std::filesystem::path& folder);
 
 /// Whether a conversion to `target` is running or was interrupted.
 bool hasUnfinished(const std::filesystem::path& target);

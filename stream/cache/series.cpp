@@ -249,7 +249,7 @@ uint64_t firstStepChecksum(const Series& series) {
 void cutAppended(const fs::path& cache, const Manifest& manifest) noexcept {
   try {
     const fs::path path = cacheFile(cache, kStepsFileName);
-    if (!manifest.hasFeature(kSteps)) removeAll(path);
+    if (!manifest.hasFeature(kSteps)) removeFileIfThere(path);
     const FileInfo* const file = manifest.file(kStepsFileName);
     if (file && fs::file_size(path) > file->size)
       OutputFile(path, Caching::kPages, OutputFile::Existing::kKeep).truncate(file->size);

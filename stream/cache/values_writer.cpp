@@ -52,8 +52,8 @@ VariableWriter::VariableWriter(const CacheLock& lock, Manifest manifest, std::ve
 VariableWriter::~VariableWriter() {
   // If another cache has replaced this one, files of these names are that cache's.
   if (in_place_ || !lock_->isStillThere()) return;
-  for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
-  for (const FileInfo& other : others_) removeAll(lock_->cache() / other.name);
+  for (const NewFile& file : files_) removeFileIfThere(file.is_renamed ? file.path : file.part);
+  for (const FileInfo& other : others_) removeFileIfThere(lock_->cache() / other.name);
 }
 
 /// Removes the files that a killed program left behind: those that the manifest does not list.
@@ -62,7 +62,7 @@ void VariableWriter::removeLeftovers() const {
   for (const auto& entry : fs::directory_iterator(lock_->cache(), ignored)) {
     const std::string name = entry.path().filename().string();
     const bool was_new = name.starts_with("var.") || isFacesFile(name) || name.ends_with(kPartSuffix);
-    if (!manifest_.file(name) && was_new && isCacheFile(entry)) removeAll(entry.path());
+    if (!manifest_.file(name) && was_new && isCacheFile(entry)) removeFileIfThere(entry.path());
   }
 }
 
@@ -186,11 +186,11 @@ StepWriter::~StepWriter() {
   // If another cache has replaced this one, files of these names are that cache's.
   if (in_place_ || !lock_->isStillThere()) return;
   removeFiles();
-  for (const FileInfo& other : others_) removeAll(lock_->cache() / other.name);
+  for (const FileInfo& other : others_) removeFileIfThere(lock_->cache() / other.name);
 }
 
 void StepWriter::removeFiles() const {
-  for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
+  for (const NewFile& file : files_) removeFileIfThere(file.is_renamed ? file.path : file.part);
 }
 
 void StepWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
@@ -266,11 +266,11 @@ void removeStepsFrom(uint64_t count, const CacheLock& lock, const CacheReader& c
       variable.max = std::max(variable.max, step.values[v].max);
     }
   }
-  std::vector<fs::path> removed;
+  std::vector<fs::path> removed, folders;
   std::set<std::string> names{kStepsFileName};
   for (uint64_t step = kept.steps.size(); step < series.steps.size(); ++step) {
     const fs::path folder = lock.cache() / geometryFolderName(series.steps[step].geometry);
-    if (series.isFirstOfGeometry(step)) removed.push_back(folder);
+    if (series.isFirstOfGeometry(step)) folders.push_back(folder);
     for (const VariableInfo& variable : manifest.variables)
       removed.push_back(folder / stepValuesName(series, step, variable.number));
     names.insert(facesFileOfStep(step));
@@ -280,7 +280,8 @@ void removeStepsFrom(uint64_t count, const CacheLock& lock, const CacheReader& c
   manifest.files.push_back(stepsFileOf(kept, manifest.variables.size()));
   lock.requireStillThere();
   replaceManifest(lock.cache(), manifest);
-  for (const fs::path& path : removed) removeAll(path);
+  for (const fs::path& path : removed) removeFileIfThere(path);
+  for (const fs::path& folder : folders) removeCacheFolder(folder);
   cutAppended(lock.cache(), manifest);
 }
 

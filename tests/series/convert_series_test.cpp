@@ -277,6 +277,37 @@ TEST(ConvertSeries, LeftoversOfAKilledAdditionDoNotMatter) {
   EXPECT_TRUE(found == wanted);
 }
 
+TEST(ConvertSeries, WhatAUserHasPutWhereAGeometryGoesStays) {
+  for (const bool is_link : {false, true}) {
+    const TemporaryFolder folder;
+    convertQuietly(inputOf({{0}, {1}}), optionsFor(folder / "a.splats"));
+    const fs::path mine = is_link ? folder / "elsewhere" : folder / "a.splats/geometry.1";
+    fs::create_directory(mine);
+    std::ofstream(mine / "results.txt") << "mine";
+    if (is_link) fs::create_directory_symlink(mine, folder / "a.splats/geometry.1");
+    SeriesOptions adding = optionsFor(folder / "a.splats");
+    adding.add = true;
+    expectError([&] { convertQuietly(inputOf({{2, 0.5}}), adding); }, {"geometry.1", "move it elsewhere"});
+    EXPECT_TRUE(fs::exists(mine / "results.txt"));
+    EXPECT_EQ(CacheReader(folder / "a.splats").series().steps.size(), 2u);
+  }
+}
+
+TEST(ConvertSeries, AFolderNamedAsTheJournalStays) {
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  SeriesOptions options = optionsFor(cache);
+  convertQuietly(inputOf({{0}}), options);
+  fs::create_directory(cache / "journal");
+  std::ofstream(cache / "journal/monday.txt") << "mine";
+  options.convert.overwrite = true;
+  for (const size_t times : {1, 2}) {
+    convertQuietly(inputOf(steadyGrid(times)), options);
+    EXPECT_TRUE(fs::exists(cache / "journal.1/monday.txt"));
+    EXPECT_FALSE(fs::exists(cache / "journal"));
+  }
+}
+
 TEST(ConvertSeries, ASeriesRefusesFurtherScalars) {
   const TemporaryFolder folder;
   convertQuietly(inputOf(steadyGrid(2)), optionsFor(folder / "a.splats"));

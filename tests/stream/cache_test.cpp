@@ -3,6 +3,9 @@
 
 #include <cerrno>
 #include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "stream/base/error.h"
 #include "stream/cache/cache_format.h"
@@ -327,12 +330,45 @@ TEST(Cache, OverwritingKeepsWhatIsNotTheCaches) {
   SmallCache().write(path, true);
   EXPECT_TRUE(isKept());
 
-  // A name in both folders: neither goes.
+  // A name in both folders: both stay.
   fs::copy(path, old, fs::copy_options::recursive | fs::copy_options::copy_symlinks);
+  overwriteFile(old / "notes.txt", "also mine");
   overwriteFile(old / kPartialLock, std::string(kPartialMark));
-  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(path, true); }), "is not the cache's and not removed");
+  SmallCache().write(path, true);
   EXPECT_TRUE(isKept());
-  EXPECT_EQ(bytesOfFile(old / "notes.txt"), "mine");
+  EXPECT_EQ(bytesOfFile(path / "notes.txt.1"), "also mine");
+}
+
+TEST(Cache, OverwritingKeepsFoldersWithNamesOfTheCachesFiles) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.splats";
+  SmallCache().write(path);
+  const std::vector<fs::path> own{"journal",        "faces.bin", "bricks.log",
+                                  "steps.bin.part", "blanks.1",  "blanks.2"};
+  for (const fs::path& name : own) {
+    fs::create_directory(path / name);
+    overwriteFile(path / name / "u", name.string());
+  }
+  SmallCache().write(path, true);
+  std::multiset<std::string> kept;
+  for (const auto& entry : fs::recursive_directory_iterator(path))
+    if (entry.path().filename().string().starts_with("u")) kept.insert(bytesOfFile(entry.path()));
+  EXPECT_EQ(kept, std::multiset<std::string>(own.begin(), own.end()));
+}
+
+TEST(Cache, OnlyFilesOfTheCacheGoWithAFolder) {
+  const TemporaryFolder folder;
+  const fs::path own = folder / "geometry.1";
+  EXPECT_FALSE(removeCacheFolder(own));
+  SmallCache().write(own);
+  fs::create_directory_symlink("geometry.1", folder / "link");
+  EXPECT_TRUE(removeCacheFolder(folder / "link"));
+  EXPECT_FALSE(CacheReader(own).bricks().empty());
+  overwriteFile(own / "notes.txt", "mine");
+  fs::create_directory(own / "steps.bin");
+  EXPECT_PRED2(says, errorOf([&] { requireCacheFolderRemoved(own); }), "move it elsewhere");
+  EXPECT_EQ(foreignNames(own), (std::vector<fs::path>{"notes.txt", "steps.bin"}));
+  EXPECT_EQ(std::distance(fs::directory_iterator(own), {}), 2);
 }
 
 TEST(Cache, OverwritesNothingButCaches) {

@@ -112,7 +112,7 @@ void runTraced(const std::filesystem::path& path, const std::vector<std::filesys
     command();
   } catch (const UsageError&) {
     endQuietly();
-    removeAll(own);
+    removeFileIfThere(own);
     throw;
   } catch (...) {
     endQuietly();
