@@ -82,6 +82,24 @@ bool isRegularFile(const std::filesystem::path& path) noexcept {
   return std::filesystem::is_regular_file(path, ignored);
 }
 
+bool isThere(const std::filesystem::path& path) {
+  std::error_code error, ignored;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (std::filesystem::status_known(status) && std::filesystem::exists(status)) return true;
+  if (status.type() != std::filesystem::file_type::not_found)
+    throw Error("{}: cannot be looked at: {}", path.string(), error.message());
+  if (std::filesystem::is_symlink(path, ignored))
+    throw Error("{}: is a link to {}, which does not exist", path.string(),
+                std::filesystem::read_symlink(path, ignored).string());
+  return false;
+}
+
+bool isFileThere(const std::filesystem::path& path) {
+  if (!isThere(path)) return false;
+  if (!isRegularFile(path)) throw Error("{}: is not a regular file", path.string());
+  return true;
+}
+
 std::filesystem::path linkTarget(std::filesystem::path path) {
   constexpr int kMaxLinks = 40;  // the kernel's limit
   const std::filesystem::path first = path;

@@ -34,6 +34,12 @@ std::string extensionOf(const std::filesystem::path& path);
 /// as names that are too long.
 bool isRegularFile(const std::filesystem::path& path) noexcept;
 
+/// Whether there is something of this name, or at the end of its links. Throws Error if that cannot be told, as for lack of rights or
+/// links in a circle, and for a link to nothing: only what is not there is missing.
+bool isThere(const std::filesystem::path& path);
+/// The same; throws Error also if it is no regular file.
+bool isFileThere(const std::filesystem::path& path);
+
 /// `path` itself, or the path at the end of its symbolic links, whether that exists or not. Throws Error if
 /// the links form a cycle.
 std::filesystem::path linkTarget(std::filesystem::path path);

@@ -183,6 +183,47 @@ class MeshFoam(MeshCase):
         self.assertEqual([piece["name"] for piece in info["pieces"]], ["processor0", "processor1", "processor2"])
         self.assertAlmostEqual(self.volume(case, "p"), expected, delta=1e-6)
 
+    def test_what_cannot_be_looked_at_is_not_missing(self):
+        case, p, _ = self.foam_case(parts=3)
+        told = lambda *options: self.run_program("info", case, *options).stderr
+        (case / "processor1").rename(case / "kept")
+        self.assertIn("processor1: is missing; the case has processors up to processor2", told())
+        (case / "processor1").symlink_to("processor1")
+        self.assertIn("processor1", told())
+        (case / "processor1").unlink()
+        (case / "processor1").mkdir()
+        self.assertIn("processor1: has no mesh", told())
+        for at_fault in ("polyMesh", "polyMesh/points"):
+            case, p, _ = self.foam_case()
+            path = case / "0.5" / at_fault
+            path.parent.mkdir(exist_ok=True)
+            for target, words in ((path.name, "cannot be looked at"), ("none", "is a link to none")):
+                path.symlink_to(target)
+                self.assertIn(words, told("--time-step", "1"))
+                path.unlink()
+        case, p, _ = self.foam_case()
+        for name in ("loop", "7"):
+            (case / name).symlink_to(name)
+            if name == "loop":
+                self.assertEqual(self.info(case)["times"], [0, 0.5])
+        self.assertIn("7: cannot be looked at", told())
+        (case / "7").unlink()
+        (case / "0" / "p").unlink()
+        (case / "0" / "p").symlink_to("p")
+        self.assertIn("cannot be looked at: Too many levels of symbolic links; p is left out", "".join(self.info(case)["warnings"]))
+
+    def test_includes_stay_in_the_case_and_are_few(self):
+        case, _, _ = self.foam_case()
+        (case / "system").mkdir()
+        (self.folder / "outside").write_text("secret 5;\n")
+        field = "dimensions [0 2 -2 0 0 0 0];\ninternalField uniform $secret;\n"
+        for name in ("../../outside", str(self.folder / "outside"), "$FOAM_CASE/../outside"):
+            FoamCase(case).write(case / "0" / "p", "volScalarField", f'#include "{name}"\n', field)
+            self.assertIn(f'includes "{name}", which lies outside the case', "".join(self.info(case)["warnings"]))
+        FoamCase(case).write(case / "0" / "p", "volScalarField", '#include "a"\n', field)
+        (case / "0" / "a").write_text('#include "a"\n' * 30)
+        self.assertIn("includes more than 100 files", "".join(self.info(case)["warnings"]))
+
     def test_collated_files_hold_all_processors(self):
         """As decomposedBlockData::writeBlockEntry; the first part has the header of the file that it stands for."""
         for binary in (False, True):

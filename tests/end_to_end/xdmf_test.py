@@ -341,6 +341,7 @@ class Xdmf(StructuredFormats):
         with h5py.File(data) as file:
             place = file["group/1"][...]
         os.mkfifo(self.folder / "in" / "pipe")
+        (self.folder / "in" / "loop.h5").symlink_to("loop.h5")
         for name in (self.folder / "out.h5", self.folder / "in" / "b.h5"):
             with h5py.File(name, "w") as file:
                 file["a"] = place
@@ -372,7 +373,9 @@ class Xdmf(StructuredFormats):
         out, elsewhere = str(self.folder / "out.h5"), "which lies outside the folder of the file"
         nested = "which is a virtual data set itself"
         for make, told in ((link("c.h5"), None), (link(str(self.folder / "in" / "c.h5")), None), (virtual(("c.h5", "a")), None), (here, None),
-                           (link("/moved/c.h5"), None), (link("pipe"), "pipe, which is not a regular file"),
+                           (link("/moved/c.h5"), None), (virtual(("c.h5", "a"), ("none.h5", "a")), "takes values from none.h5, which is not found"),
+                           (virtual(("c.h5", "b")), "there is no such data set"), (virtual(("loop.h5", "a")), "takes values from loop.h5, which is not found"),
+                           (link("pipe"), "pipe, which is not a regular file"),
                            (link("b.h5"), "pipe, which is not a regular file"), (virtual(("b.h5", "a")), "pipe, which is not a regular file"),
                            (link(out), elsewhere), (link("../out.h5"), elsewhere), (virtual((out, "a")), elsewhere),
                            (virtual(("pipe", "a")), "pipe, which is not a regular file"), (virtual((".", "/group/1")), nested),

@@ -166,6 +166,19 @@ class ZarrStores(ModelFileTest):
                              np.isnan(values[0]).sum())
             self.assertEqual(info["blanked"]["by_grid"] + info["blanked"]["not_finite"], np.isnan(values[0]).sum())
 
+    def test_chunks_that_cannot_be_looked_at_are_not_missing(self):
+        store = self.store(2, "l.zarr", dict(chunks=(1, 9, 17, 24)))
+        file = next(file for file in sorted((store.path / "temp").iterdir()) if file.name[0] in "0123456789")
+        file.unlink()
+        self.info("l.zarr")
+        for make, told in ((file.mkdir, "is not a regular file"), (lambda: os.mkfifo(file), "is not a regular file"),
+                           (lambda: file.symlink_to(file.name), "cannot be looked at"), (lambda: file.symlink_to("none"), "is a link to none, which does not exist")):
+            make()
+            error = self.info("l.zarr", fails=True)
+            self.assertIn(f"{file.name}: {told}", error)
+            self.assertEqual(error.count("\n"), 1)
+            file.rmdir() if told.startswith("is not") and file.is_dir() else file.unlink()
+
     def test_numbers_of_every_type(self):
         for version in (2, 3):
             for kind in some_of("i1 u1 i2 u2 i4 u4 i8 u8 f2 f4 f8 ?".split(), 2, turn=version):

@@ -107,6 +107,8 @@ class ExitFinder {
         exits_.sources.push_back({path_, source});
       else if (const auto found = follow(set, file))
         exits_.sources.push_back({*found, source});
+      else  // HDF5 would give its fill value
+        fail(set, "takes values from " + file + ", which is not found; put it beside this file");
     }
   }
 
@@ -155,6 +157,9 @@ void requireStored(const std::filesystem::path& path, const std::vector<Hdf5Exit
   for (const auto& source : sources) {
     const Hdf5File file(H5Fopen(source.file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
     const Hdf5Object set(file ? H5Oopen(file.id(), source.set.c_str(), H5P_DEFAULT) : -1);
+    if (!set)  // HDF5 would give its fill value
+      throw Error("{}: takes virtual data from {} in {}, which cannot be opened{}", path.string(), source.set,
+                  source.file.string(), file ? ": there is no such data set" : "");
     const Hdf5Properties properties(set ? H5Dget_create_plist(set.id()) : -1);
     if (properties && isVirtual(properties))
       throw Error(

@@ -138,7 +138,7 @@ void ZarrStore::readDirectory() {
 std::optional<ZarrValue> ZarrStore::find(const std::string& key) const {
   if (!archive_) {
     const fs::path path = path_ / key;
-    if (!isRegularFile(path)) return std::nullopt;
+    if (!isFileThere(path)) return std::nullopt;
     auto file = std::make_shared<const InputFile>(path);
     const uint64_t size = file->size();
     return ZarrValue{std::move(file), 0, size};

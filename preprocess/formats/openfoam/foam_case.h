@@ -1,5 +1,5 @@
-// Finds what a case of OpenFOAM consists of by the names of its folders: regions, processors, times. Reads no mesh; a missing
-// folder is an empty one, but of foamTimesIn().
+// Finds what a case of OpenFOAM consists of by the names of its folders: regions, processors, times. Reads no mesh. A missing
+// folder is an empty one; all throw Error for one that is there and cannot be read.
 #pragma once
 
 #include <cstdint>
@@ -31,10 +31,12 @@ struct FoamProcessor {
   std::filesystem::path folder;
   uint32_t part = 0;  // of collated files
 };
-/// The processors of a decomposed case, in their order. Empty if it is not decomposed.
+/// The processors of a decomposed case that have folders, in their order. Empty if none has a mesh.
 std::vector<FoamProcessor> foamProcessorsOf(const std::filesystem::path& folder);
+/// Throws Error unless these are processors 0, 1, 2, ..., with a mesh each.
+void requireAllProcessors(const std::vector<FoamProcessor>& processors);
 
-/// The times that have a folder, in their order, with the folders' names. Throws if the folder cannot be read.
+/// The times that have a folder, in their order, with the folders' names.
 std::vector<std::pair<double, std::string>> foamTimesIn(const std::filesystem::path& folder);
 
 }  // namespace curvisplat

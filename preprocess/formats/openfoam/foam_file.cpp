@@ -123,16 +123,17 @@ struct FoamFile::Parser final : FoamParser {
 };
 
 bool FoamFile::exists(const std::filesystem::path& path) {
-  std::error_code error;
-  std::filesystem::path packed = path;
-  packed += ".gz";
-  return std::filesystem::is_regular_file(path, error) || std::filesystem::is_regular_file(packed, error);
+  return isFileThere(path) || isFileThere(path.string() + ".gz");
+}
+
+std::filesystem::path FoamFile::pathOf(const std::filesystem::path& path) {
+  const std::filesystem::path packed = path.string() + ".gz";
+  return !isRegularFile(path) && isRegularFile(packed) ? packed : path;
 }
 
 FoamFile::FoamFile(const std::filesystem::path& path, ListSpools spools,
                    const std::filesystem::path& temporary_folder, uint32_t processor)
-    : original_(path), spools_(std::move(spools)) {
-  if (!isRegularFile(path) && isRegularFile(path.string() + ".gz")) original_ += ".gz";
+    : original_(pathOf(path)), spools_(std::move(spools)) {
   std::filesystem::path plain = original_;
   if (UnpackedFile::recognises(InputFile(original_))) {
     unpacked_ = std::make_unique<UnpackedFile>(original_, temporary_folder);

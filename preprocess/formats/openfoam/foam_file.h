@@ -34,7 +34,10 @@ class FoamFile {
   FoamFile(FoamFile&&) noexcept;
   ~FoamFile();
 
+  /// Whether `path` or `path`.gz is there. Throws Error as isFileThere().
   static bool exists(const std::filesystem::path& path);
+  /// `path`, or `path`.gz where that is what there is.
+  static std::filesystem::path pathOf(const std::filesystem::path& path);
   /// How many processors' parts a collated file has; 1 for any other.
   static uint32_t processorsIn(const std::filesystem::path& path);
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/text_reader.h"
 #include "stream/base/error.h"
 
@@ -20,7 +21,8 @@ constexpr size_t kFirstRead = 4096;
 constexpr uint64_t kMaxNumbers = 100'000'000'000'000;
 constexpr int kMaxExpansions = 100;
 constexpr size_t kMaxEntryTokens = 100;  // longer ones are lists of values, which no field uses
-constexpr int kMaxIncludes = 8;          // in one another
+constexpr int kMaxIncludeDepth = 8;
+constexpr int kMaxIncludes = 100;  // of one file, with those of the files that it includes
 
 bool isSpace(int c) {
   return c == ' ' || c == '\t' || c == '\n' || c == '\r';
@@ -235,14 +237,22 @@ void FoamParser::include(const std::filesystem::path& path, int depth) {
     if (begin == "<system>" || begin == "<constant>") included /= begin.substr(1, begin.size() - 2);
     for (auto part = std::next(path.begin()); part != path.end(); ++part) included /= *part;
   }
-  if (depth >= kMaxIncludes || !isRegularFile(included)) {
+  std::error_code no_folder;
+  if (leadsOut(caseAround(name_), std::filesystem::absolute(included, no_folder)))
+    fail(fmt::format(
+        "includes \"{}\", which lies outside the case; put it into the case's folder and correct the name",
+        path.string()));
+  if (depth >= kMaxIncludeDepth || !isRegularFile(included)) {
     missing_ = path.string();  // what it defines is missed where it is used
     return;
   }
+  if (++includes_ > kMaxIncludes) fail(fmt::format("includes more than {} files", kMaxIncludes));
   FoamParser other(included, included.string());
+  other.includes_ = includes_;
   other.entries_ = std::move(entries_);
   other.findEntry("", depth + 1);
   entries_ = std::move(other.entries_);
+  includes_ = other.includes_;
   if (!other.missing_.empty()) missing_ = other.missing_;
 }
 

@@ -68,7 +68,7 @@ class FoamParser {
   size_t at_ = 0, filled_ = 0, refill_;  // bytes to read next: few, in case it goes on elsewhere
   std::map<std::string, std::vector<std::string>> entries_;  // what "$name" stands for
   std::deque<std::string> expanded_;                         // tokens of such entries, which come next
-  int expansions_ = 0;
+  int expansions_ = 0, includes_ = 0;
   std::string missing_;  // a file that is included and was not found
 };
 

@@ -22,6 +22,7 @@
 #include "preprocess/formats/openfoam/foam_file.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "stream/base/name_list.h"
 
 namespace curvisplat {
@@ -155,6 +156,7 @@ void FoamSource::choosePieces(const fs::path& folder) {
     pieces_.emplace_back().folder = folder;
     return;
   }
+  requireAllProcessors(processors);
   for (const FoamProcessor& processor : processors) {
     Piece& piece = pieces_.emplace_back();
     piece.folder = processor.folder;
@@ -201,8 +203,8 @@ void FoamSource::findTimes(std::optional<uint32_t> asked, const fs::path& shown)
 /// A mesh that moves has its points, and one that changes all files, in the folder of the time.
 fs::path FoamSource::meshFile(const Piece& piece, const char* name) const {
   for (size_t step = time_names_.empty() ? 0 : description_.time_step + size_t{1}; step-- > 0;) {
-    const fs::path moved = piece.folder / time_names_[step] / piece.region / "polyMesh" / name;
-    if (FoamFile::exists(moved)) return moved;
+    const fs::path moved = piece.folder / time_names_[step] / piece.region / "polyMesh";
+    if (isThere(moved) && FoamFile::exists(moved / name)) return moved / name;
   }
   return piece.folder / "constant" / piece.region / "polyMesh" / name;
 }
@@ -264,7 +266,9 @@ std::map<std::string, std::vector<fs::path>> FoamSource::filesAt(const std::stri
     if (piece.folder != pieces_.front().folder || piece.processor != pieces_.front().processor) continue;
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(piece.folder / time / piece.region, error)) {
-      if (!entry.is_regular_file(error)) continue;
+      std::error_code unknown;  // what cannot be looked at is named when it is opened
+      const fs::file_status status = entry.status(unknown);
+      if (fs::exists(status) && !fs::is_regular_file(status)) continue;
       fs::path name = entry.path().filename();
       if (name.extension() == ".gz") name = name.stem();
       files[name.string()].push_back(piece.folder / time / piece.region / name);
@@ -278,6 +282,13 @@ void FoamSource::findFields() {
   for (const auto& [name, paths] : filesAt(time_names_[description_.time_step])) {
     const fs::path& path = paths.front();
     std::optional<FoamFile> file;
+    try {
+      if (!FoamFile::exists(path)) continue;
+      const InputFile readable(FoamFile::pathOf(path));
+    } catch (const Error& error) {
+      description_.warnings.push_back(fmt::format("{}; {} is left out", error.what(), name));
+      continue;
+    }
     try {
       file.emplace(open(pieces_.front(), path));
     } catch (const Error&) {
