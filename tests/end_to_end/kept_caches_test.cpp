@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <iterator>
 
 #include "stream/base/file.h"
 #include "tests/end_to_end/window_fixture.h"
@@ -189,8 +190,7 @@ TEST_F(KeptCaches, OfAGridThatIsStoppedNothingStays) {
   render.signal(SIGTERM);
   EXPECT_EQ(render.wait().status, 128 + SIGTERM);
   for (const auto& entry : fs::recursive_directory_iterator("kept/curvisplat"))
-    EXPECT_TRUE(entry.is_directory() || entry.path().filename() == "used" ||
-                entry.path().parent_path().filename() == "known")
+    EXPECT_TRUE(entry.path().filename() == "known" || entry.path().parent_path().filename() == "known")
         << entry.path();
 }
 
@@ -217,6 +217,18 @@ TEST_F(KeptCaches, SetsThatNameFilesThousandsOfTimesAreSearchedOnce) {
   const ProgramResult result = runProgram({"render", "outer.vtm", "-o", "grid.png", "--size", "20x20"});
   EXPECT_EQ(result.status, 1);  // 27 thousand million files
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
+}
+
+TEST_F(KeptCaches, FilesOutsideAreNotReadAndAFailureLeavesNothing) {
+  fs::create_directory("set");
+  writeFileAtomically("outside.vts", vtsFile(annulusVtsGrid(2, 2, 2), {}));
+  writeSet("set/a.vtm", "../outside.vts", 1);
+  fs::remove_all("kept");
+  const ProgramResult result = runProgram({"render", "set/a.vtm", "-o", "grid.png", "--size", "20x20"});
+  EXPECT_EQ(result.status, 1);
+  expectSays(result.err, "which lies outside its folder");
+  EXPECT_EQ(std::distance(fs::directory_iterator("kept/curvisplat/known"), {}), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator("kept/curvisplat"), {}), 1);
 }
 
 }  // namespace

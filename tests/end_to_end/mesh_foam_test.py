@@ -410,6 +410,15 @@ class MeshFoam(MeshCase):
         self.assertEqual(caches_after_a_picture(case / "case.foam"), 3)
         writer.write_field(case / "0", "p", p + 8)
         self.assertEqual(caches_after_a_picture(case / "case.foam"), 4)
+        known = len(list((kept / "known").iterdir()))
+        for folder in ("postProcessing", "results"):
+            (case / folder).mkdir()
+            with open(case / folder / "huge", "wb") as huge:
+                huge.truncate(5 << 20)
+        self.assertEqual(caches_after_a_picture(case / "case.foam"), 4)
+        self.assertEqual(len(list((kept / "known").iterdir())), known)
+        (case / "results" / "included").write_text("a 1;")
+        self.assertEqual(caches_after_a_picture(case / "case.foam"), 5)
 
     def test_regions(self):
         """As chtMultiRegionFoam: two cubes side by side, of which one alone has U."""

@@ -353,6 +353,7 @@ class Follow : public ProgramTest {
 TEST_F(Follow, NoticesChanges) {
   generate(2);
   fs::rename(file("w_0001.fun"), file("later"));
+  fs::create_symlink("none", file("w_0001.fun"));
   RunningProgram following(
       {"convert", file("w.xyz"), file("w_*.fun"), "--follow", "--until", "2", "-o", file("a.splats")});
   {
@@ -363,6 +364,9 @@ TEST_F(Follow, NoticesChanges) {
   fs::rename(file("later"), file("w_0001.fun"));
   const ProgramResult result = following.wait();
   EXPECT_EQ(result.status, 0) << result.err;
+  expectSays(result.err, "warning: waiting for a file: " + file("w_0001.fun") +
+                             ": is a link to none, which does not exist");
+  EXPECT_EQ(lineCount(result.err), 2) << result.err;
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
 }
 
@@ -371,7 +375,9 @@ TEST_F(Follow, TriesTheLastFileAgainWhenItHasChanged) {
   generate(3);
   const std::string whole = bytesOfFile(file("w_0001.fun"));
   fs::rename(file("w_0002.fun"), file("later"));
-  fs::resize_file(file("w_0001.fun"), whole.size() / 2);
+  // The file that takes its place has its size and its date.
+  std::ofstream(file("w_0001.fun"), std::ios::binary) << std::string(whole.size(), '\x7f');
+  const auto written = fs::last_write_time(file("w_0001.fun"));
   const auto command = [&](const char* cache, const std::string& more) {
     return fmt::format("exec '{}' convert '{}' '{}' --follow --until 2 --refine 1 -o '{}' {} 2>'{}'",
                        CURVISPLAT_PROGRAM, file("w.xyz"), file("w_*.fun"), file(cache), more, file("said"));
@@ -383,6 +389,7 @@ TEST_F(Follow, TriesTheLastFileAgainWhenItHasChanged) {
     watch.waitUntil([&] { return bytesOfFile(file("said")).find("not taken yet: ") != std::string::npos; });
   }
   std::ofstream(file("whole"), std::ios::binary) << whole;
+  fs::last_write_time(file("whole"), written);
   fs::rename(file("whole"), file("w_0001.fun"));
   EXPECT_EQ(following.wait().status, 0);
   EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);

@@ -160,6 +160,10 @@ void follow(const ConvertArguments& arguments) {
   }
   while (!arguments.until || steps < *arguments.until) {
     const std::optional<StepFiles> step = files.next();
+    for (const std::string& reason : files.takeReasons()) {
+      progress.end();
+      printMessage("warning: waiting for a file: {}", reason);
+    }
     if (!step) {
       events.wait(files.untilNext(), progress);
       continue;

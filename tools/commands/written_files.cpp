@@ -32,12 +32,19 @@ milliseconds WrittenFiles::untilSettled(const StepFiles& step) {
   milliseconds longest{0};
   const auto now = std::chrono::steady_clock::now();
   for (const fs::path& path : filesOf(step.options)) {
-    std::error_code error, no_size;
+    std::error_code error;
     const auto written = fs::last_write_time(path, error);
-    const auto bytes = fs::file_size(path, no_size);
-    if (error) return kSettled;
-    Seen& seen = seen_.try_emplace(path, Seen{written, bytes, now}).first->second;
-    if (seen.written != written || seen.bytes != bytes) seen = {written, bytes, now};
+    if (error) {
+      try {
+        isThere(path);
+      } catch (const Error& reason) {
+        if (told_.insert(reason.what()).second) reasons_.push_back(reason.what());
+      }
+      return kSettled;
+    }
+    const FileState state = FileState::of(path);
+    Seen& seen = seen_.try_emplace(path, Seen{state, written, now}).first->second;
+    if (seen.written != written || seen.state != state) seen = {state, written, now};
     longest = std::max(longest, std::chrono::ceil<milliseconds>(kSettled - (now - seen.since)));
   }
   return longest;

@@ -9,10 +9,12 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/progress.h"
+#include "stream/base/watched_file.h"
 
 namespace curvisplat {
 
@@ -40,11 +42,13 @@ class WrittenFiles {
   void tryAgain(const StepFiles& step);
   /// How long to wait at most after nullopt before looking again, unless a file changes.
   std::chrono::milliseconds untilNext() const { return until_next_; }
+  /// Why files that have a name cannot be looked at, such as links to nothing: next() waits for them. Each is returned once.
+  std::vector<std::string> takeReasons() { return std::exchange(reasons_, {}); }
 
  private:
   struct Seen {
-    std::filesystem::file_time_type written;
-    uintmax_t bytes;
+    FileState state;
+    std::filesystem::file_time_type written;  // also of a folder, such as a Zarr store
     std::chrono::steady_clock::time_point since;
   };
   struct Failed {
@@ -59,6 +63,8 @@ class WrittenFiles {
 
   const OpenGridOptions& options_;
   std::map<std::filesystem::path, Seen> seen_;
+  std::set<std::string> told_;  // that were among the reasons
+  std::vector<std::string> reasons_;
   std::set<std::string> done_;   // names of steps
   bool begins_at_last_ = false;  // of those that are done
   bool is_last_ = false;

@@ -4,12 +4,15 @@
 #include <fmt/format.h>
 #include <fnmatch.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
@@ -18,6 +21,7 @@
 #include <thread>
 #include <utility>
 
+#include "preprocess/formats/common/byte_source.h"
 #include "preprocess/formats/common/library_trial.h"
 #include "preprocess/formats/common/temporary_folder.h"
 #include "preprocess/formats/common/unpacked_file.h"
@@ -139,13 +143,36 @@ uint64_t checksumOf(const fs::path& path, const std::string& stamp, const fs::pa
   return checksum;
 }
 
-/// A lock on the folder of one cache, which is waited for.
+constexpr const char* kUsed = "used";  // the file that is locked; its date is when the cache was used last
+
+/// A lock on the folder of one cache, which is made and waited for.
 class MakingLock {
  public:
-  MakingLock(const fs::path& file, const Progress& progress) {
-    fd_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd_ < 0)
-      throw Error("{}: cannot be opened: {}", file.string(), std::generic_category().message(errno));
+  MakingLock(const fs::path& place, const Progress& progress) : file_(place / kUsed) {
+    do {
+      makePrivateFolders(place);
+      if (fd_ >= 0) ::close(fd_);
+      fd_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+      if (fd_ < 0 && errno == ENOENT) continue;
+      if (fd_ < 0)
+        throw Error("{}: cannot be opened: {}", file_.string(), std::generic_category().message(errno));
+      wait(progress);
+    } while (!isLocked());
+  }
+  ~MakingLock() { ::close(fd_); }
+  MakingLock(const MakingLock&) = delete;
+  MakingLock& operator=(const MakingLock&) = delete;
+
+  /// Removes the folder if nothing else is in it. Whoever waits for the lock then makes it again.
+  void removeEmptyFolder() {
+    std::error_code error;
+    const fs::path place = file_.parent_path();
+    if (std::distance(fs::directory_iterator(place, error), {}) == 1 && fs::remove(file_, error))
+      fs::remove(place, error);
+  }
+
+ private:
+  void wait(const Progress& progress) {
     while (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
       if (errno != EWOULDBLOCK && errno != EINTR) break;  // a file system without locks
       try {
@@ -157,11 +184,15 @@ class MakingLock {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
   }
-  ~MakingLock() { ::close(fd_); }
-  MakingLock(const MakingLock&) = delete;
-  MakingLock& operator=(const MakingLock&) = delete;
+  /// Whether the file still has its name.
+  bool isLocked() const {
+    struct stat ours {
+    }, named{};
+    return fd_ >= 0 && ::fstat(fd_, &ours) == 0 && ::stat(file_.c_str(), &named) == 0 &&
+           ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
+  }
 
- private:
+  const fs::path file_;
   int fd_ = -1;
 };
 
@@ -224,6 +255,7 @@ std::set<std::string> fileNamesIn(const std::string& text) {
 std::vector<fs::path> filesNamed(const std::string& name, const fs::path& file) {
   std::vector<fs::path> found;
   const fs::path path = file.parent_path() / name;
+  if (leadsOut(folderOf(file), name)) return found;  // nor does a reader follow it
   std::error_code error;
   if (name.find('*') == std::string::npos) {
     if (fs::is_regular_file(path, error)) found.push_back(path);
@@ -258,7 +290,7 @@ class StampedFiles {
     progress_.throwIfStopped();
     std::error_code error;
     if (isFoamCase(file)) return addCase(foamCaseOf(file).folder);
-    if (fs::is_directory(file, error)) return addFolder(file, {});
+    if (fs::is_directory(file, error)) return addFolder(file);
     if (!seen_.emplace(depth, file.lexically_normal()).second) return;
     all_.push_back(file);
     if (const auto files = linkedBy(file, known_))
@@ -284,25 +316,37 @@ class StampedFiles {
     for (const auto& entry : fs::directory_iterator(folder, error))
       if (entry.path().filename().string().starts_with("processor") && entry.is_directory(error))
         roots.push_back(entry.path());
-    std::set<std::string> first_ones;
+    std::set<fs::path> first_ones;
     std::set<fs::path> later;
     for (const fs::path& root : roots) {
       const auto times = foamTimesIn(root);
       if (!times.empty()) first_ones.insert(times.front().second);
       for (const auto& time : times) later.insert(root / time.second);
     }
-    std::erase_if(later, [&](const fs::path& time) { return first_ones.contains(time.filename().string()); });
+    std::erase_if(later, [&](const fs::path& time) { return first_ones.contains(time.filename()); });
     for (const fs::path& time : later) times_left_out_.push_back(time.lexically_relative(folder).string());
-    addFolder(folder, later);
+    std::set<fs::path> read = first_ones;
+    read.insert({"constant", "system"});
+    std::set<fs::path> apart = std::move(later);
+    for (const fs::path& root : roots)
+      for (const fs::path& name : read) {
+        addFolder(root / name);
+        apart.insert(root / name);
+      }
+    // Of other files are read those that values include: small texts.
+    for (const char* const written : {"postProcessing", "VTK", "dynamicCode"}) apart.insert(folder / written);
+    addFolder(folder, apart, kMaxText);
   }
 
-  void addFolder(const fs::path& folder, const std::set<fs::path>& left_out) {
+  void addFolder(const fs::path& folder, const std::set<fs::path>& left_out = {},
+                 uint64_t most = std::numeric_limits<uint64_t>::max()) {
     std::error_code error;
     const auto begin = static_cast<std::ptrdiff_t>(all_.size());
     for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
       progress_.throwIfStopped();
       if (left_out.contains(at->path())) at.disable_recursion_pending();
-      if (std::error_code no_file; at->is_regular_file(no_file)) all_.push_back(at->path());
+      if (std::error_code no_file; at->is_regular_file(no_file) && at->file_size(no_file) <= most)
+        all_.push_back(at->path());
     }
     std::sort(all_.begin() + begin, all_.end());
   }
@@ -404,9 +448,8 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
   const uint64_t contents = contentsOf(files, stamped, known, progress);
   const fs::path place = *folder / fmt::format("{:016x}-{}", contents, wordOf(precision));
   const fs::path cache = place / (files.front().stem().string() + ".splats");
-  makePrivateFolders(place);
-  {
-    const MakingLock lock(place / "used", progress);
+  MakingLock lock(place, progress);
+  try {
     removeChanged(place, cache);
     if (!fs::exists(cache / "manifest.json", error)) {
       makeKeptCache(files, cache, progress, events, scalars, precision);
@@ -419,7 +462,10 @@ fs::path keptCacheOf(const std::vector<fs::path>& given_files, Progress& progres
       }
     }
     addMissingScalars(cache, files, scalars, progress);
-    fs::last_write_time(place / "used", fs::file_time_type::clock::now(), error);
+    fs::last_write_time(place / kUsed, fs::file_time_type::clock::now(), error);
+  } catch (...) {
+    lock.removeEmptyFolder();
+    throw;
   }
   limitKeptCaches(*folder, limit, place);
   return cache;
@@ -436,7 +482,7 @@ void limitKeptCaches(const fs::path& folder, uint64_t limit, const fs::path& kep
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     std::error_code no_file;
-    const auto used = fs::last_write_time(at->path() / "used", no_file);
+    const auto used = fs::last_write_time(at->path() / kUsed, no_file);
     if (no_file) continue;  // not one of ours
     all.push_back({at->path(), used, bytesIn(at->path())});
     total += all.back().bytes;
@@ -444,7 +490,7 @@ void limitKeptCaches(const fs::path& folder, uint64_t limit, const fs::path& kep
   std::sort(all.begin(), all.end(), [](const CacheEntry& a, const CacheEntry& b) { return a.used < b.used; });
   for (const CacheEntry& one : all) {
     if (total <= limit) return;
-    if (one.place == kept || isBeingMade(one.place / "used")) continue;
+    if (one.place == kept || isBeingMade(one.place / kUsed)) continue;
     fs::remove_all(one.place, error);
     if (!error) total -= one.bytes;
   }

@@ -104,8 +104,10 @@ class GmshReader {
     leaveBytes();
     uint64_t at = text_.offset();
     std::vector<char> some;
+    uint64_t at_once = kFirstBytes;  // many sections are short
     while (at < size()) {
-      some.resize(static_cast<size_t>(std::min<uint64_t>(kBufferBytes, size() - at)));
+      at_once = std::min(2 * at_once, kBufferBytes);
+      some.resize(static_cast<size_t>(std::min(at_once, size() - at)));
       file_->readAt(at, std::as_writable_bytes(std::span(some)));
       const size_t found = std::string_view(some.data(), some.size()).find(end);
       if (found != std::string_view::npos) {
@@ -136,7 +138,7 @@ class GmshReader {
   }
 
  private:
-  static constexpr uint64_t kBufferBytes = 1 << 20;
+  static constexpr uint64_t kBufferBytes = 1 << 20, kFirstBytes = 1 << 10;
 
   void leaveBytes() {
     if (bytes_at_ > 0) seek(bytes_at_);

@@ -215,10 +215,11 @@ std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
   if (areOneStep(options)) return {{options, options.grid.string()}};
   const Groups groups = groupsOf(options);
   std::vector<StepFiles> steps;
+  OpenGridOptions of_each = options;
+  of_each.solutions.clear();
   for (size_t n = 0; n < groups.steps; ++n) {
-    OpenGridOptions files = options;
+    OpenGridOptions files = of_each;
     files.grid = fileAt(groups.grids, n);
-    files.solutions.clear();
     for (const auto& group : groups.solutions) files.solutions.push_back(fileAt(group, n));
     // The others of an Exodus run are given, too; those of other processors are not.
     files.is_part = groups.steps > 1 && !exodusName(files.grid).processor;

@@ -21,6 +21,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_set>
 #include <variant>
 #include <vector>
 
@@ -139,10 +140,11 @@ using VtkPoints = VtkArray;
 struct VtkPiece {
   VtkExtent extent;
   std::variant<VtkPoints, VtkAxes, VtkUniformNodes> nodes;
-  std::vector<VtkArray> point_data, cell_data;        // one tuple per node, per cell
-  std::optional<VtkArray> point_ghosts, cell_ghosts;  // vtkGhostType
-  std::optional<VtkArray> cell_levels;                // vtkGhostLevels: above 0 another piece's
-  std::optional<VtkArray> visible;                    // one value per node; 0 hides it
+  std::vector<VtkArray> point_data, cell_data;              // one tuple per node, per cell
+  std::unordered_set<std::string> point_names, cell_names;  // of these arrays
+  std::optional<VtkArray> point_ghosts, cell_ghosts;        // vtkGhostType
+  std::optional<VtkArray> cell_levels;                      // vtkGhostLevels: above 0 another piece's
+  std::optional<VtkArray> visible;                          // one value per node; 0 hides it
   std::vector<VtkExtent>
       refined;  // cells that finer patches of an AMR set cover: indices from the piece's first cell
   std::string active_point_data, active_cell_data;  // names of arrays; may be empty

@@ -312,14 +312,11 @@ void addDataArray(VtkPiece& piece, bool of_cells, VtkArray array, std::vector<st
     (of_cells ? piece.cell_ghosts : piece.point_ghosts) = std::move(array);
     return;
   }
-  std::vector<VtkArray>& data = of_cells ? piece.cell_data : piece.point_data;
-  const bool known =
-      std::any_of(data.begin(), data.end(), [&](const VtkArray& other) { return other.name == array.name; });
-  if (known)
+  if (!(of_cells ? piece.cell_names : piece.point_names).insert(array.name).second)
     warnings.push_back(
         fmt::format("a second array {} of the {} is ignored", array.name, of_cells ? "cells" : "points"));
   else
-    data.push_back(std::move(array));
+    (of_cells ? piece.cell_data : piece.point_data).push_back(std::move(array));
 }
 
 VtkSource::VtkSource(VtkGrid grid) : grid_(std::move(grid)) {
