@@ -65,7 +65,7 @@ void writeToStderr(std::string_view text) {
   try {
     if (std::current_exception()) throw;
   } catch (const std::bad_alloc&) {
-    writeToStderr("curvisplat: out of memory; lower --memory or --size, or use a machine with more memory\n");
+    writeToStderr("curvisplat: out of memory; ask for less, or use a machine with more memory\n");
     ::_exit(1);
   } catch (const std::exception& error) {
     // TBB throws a runtime_error with this text.
@@ -215,6 +215,16 @@ int fail(const std::string& line, int status) {
   return status;
 }
 
+/// What helps: those options of the command that hold most of its memory.
+std::string outOfMemory(const CLI::App& app) {
+  std::string options;
+  for (const CLI::App* const command : app.get_subcommands())
+    for (const char* const name : {"--memory", "--size"})
+      if (command->get_option_no_throw(name)) options += (options.empty() ? "lower " : " or ") + std::string(name);
+  return fmt::format("out of memory; {}, or use a machine with more memory",
+                     options.empty() ? "ask for less" : options);
+}
+
 /// Returns the exit status: 0 success, 1 failure, 2 wrong usage, 128 + n stopped by signal n.
 int run(int argc, char** argv) {
   CLI::App app("Render curvilinear simulation grids that are larger than memory.", "curvisplat");
@@ -262,7 +272,7 @@ int run(int argc, char** argv) {
   } catch (const Interrupted& interrupted) {
     return fail(interrupted.what(), 128 + interrupted.signal());  // as a shell reports for a signal
   } catch (const std::bad_alloc&) {
-    return fail("out of memory; lower --memory or --size, or use a machine with more memory", 1);
+    return fail(outOfMemory(app), 1);
   } catch (const std::filesystem::filesystem_error& error) {
     return fail(textOf(error), 1);
   } catch (const std::exception& error) {

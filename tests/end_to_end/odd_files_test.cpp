@@ -13,6 +13,7 @@
 
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
+#include "stream/base/text.h"
 #include "tests/support/cube_files.h"
 #include "tests/support/fault_sweep.h"
 #include "tests/support/memory_limit.h"
@@ -358,7 +359,7 @@ TEST_F(OddFiles, NamesThatAreTooLongWhileTheFilesAreWrittenAreRefusedBeforeTheWo
     if (bytes > 249 && bytes < 255 && !faults::isWholeSweep()) continue;
     SCOPED_TRACE(bytes);
     const std::string too_long =
-        "the name is too long; choose one that is " + std::to_string(bytes - 247) + " bytes shorter";
+        "the name is too long; choose one that is " + countText(bytes - 247, "byte") + " shorter";
     const std::string output = file(nameOf(bytes));
     expectRefused({"convert", file("damaged.xyz"), "-o", output}, 1, {too_long});
     expectRefused({"convert", file("damaged.xyz"), frames, "-o", output}, 1, {too_long});

@@ -106,13 +106,17 @@ class OddNames(unittest.TestCase):
                 self.run_in("export", "g.splats", "-o", "g.ply", "--no-comparison")
 
     def test_very_many_names(self):
-        names = [f"s{n}" for n in range(30000)]
+        names = [f"s{n}" for n in range(100000)]
         folder = pathlib.Path(self.folder.name)
         (folder / "a.vtk").write_text("# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
                                       f"SPACING 1 1 1\nPOINT_DATA 8\nFIELD f {len(names)}\n"
                                       + "".join(f"{name} 1 8 double\n1 2 3 4 5 6 7 8\n" for name in names))
         (folder / "a.nc").write_bytes(classic_netcdf(names[:15000]))
-        for file in ("a.vtk", "a.nc"):
+        # A section of Gmsh for each step of a scalar.
+        (folder / "a.msh").write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+                                      "$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n"
+                                      + "".join(f'$NodeData\n1\n"s14999"\n1\n{n}\n3\n{n}\n1\n4\n1 0\n2 1\n3 2\n4 3\n$EndNodeData\n' for n in range(50000)))
+        for file in ("a.vtk", "a.nc", "a.msh"):
             with self.subTest(file=file):
                 self.run_in("convert", file, "--scalar", "s14999", "-o", f"{file}.splats")
 

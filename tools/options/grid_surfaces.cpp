@@ -319,12 +319,12 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
   if (!faces && cache.manifest().isMesh())
     throw Error(
         "{}: --surface {}: the cache is of an unstructured grid, whose faces are not kept; "
-        "name an STL, PLY or OBJ file that exists",
+        "name an STL, PLY, OBJ or VTP file that exists",
         path, text);
   if (!faces)
     throw Error(
         "{}: --surface {}: the cache has no surfaces: it was converted with --no-surfaces or by an earlier "
-        "version; convert again, or name an STL, PLY or OBJ file that exists",
+        "version; convert again, or name an STL, PLY, OBJ or VTP file that exists",
         path, text);
   GridSurface surface;
   surface.faces = faces;

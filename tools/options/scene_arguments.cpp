@@ -136,7 +136,15 @@ std::vector<std::optional<glm::vec3>> parseIsoColours(const SurfaceArguments& ar
   return colours;
 }
 
+bool hasSurfaceEnding(const std::filesystem::path& path) {
+  const std::string extension = extensionOf(path);
+  return extension == ".stl" || extension == ".ply" || extension == ".obj" || extension == ".vtp";
+}
+
 TriangleMesh meshFromFile(const std::filesystem::path& path) {
+  if (!hasSurfaceEnding(path))
+    throw Error("{}: unknown surface format (extension '{}'); STL, PLY, OBJ and VTP files can be read",
+                path.string(), extensionOf(path));
   if (!isVtp(path)) return readMeshFile(path);
   VtkSurface surface = readVtkSurface(path);
   return meshOf({std::move(surface.points), std::move(surface.triangles)});
@@ -328,9 +336,7 @@ bool isVtp(const std::filesystem::path& path) {
 bool isSurfaceFile(const std::string& text) {
   std::error_code ignored;
   if (std::filesystem::exists(text, ignored)) return true;
-  const std::string extension = extensionOf(text);
-  return text.find('/') != std::string::npos || extension == ".stl" || extension == ".ply" ||
-         extension == ".obj" || extension == ".vtp";
+  return text.find('/') != std::string::npos || hasSurfaceEnding(text);
 }
 
 bool hasFaces(const SurfaceArguments& arguments) {

@@ -14,6 +14,7 @@
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/text.h"
 #include "stream/base/threads.h"
 
 namespace curvisplat {
@@ -33,8 +34,8 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
   const long most = ::pathconf(folder.c_str(), _PC_NAME_MAX);
   const size_t bytes = path.filename().string().size() + suffix.size();
   if (most > 0 && bytes > static_cast<size_t>(most))
-    throw Error("{} {}: the name is too long; choose one that is {} bytes shorter", option, path.string(),
-                bytes - static_cast<size_t>(most));
+    throw Error("{} {}: the name is too long; choose one that is {} shorter", option, path.string(),
+                countText(bytes - static_cast<size_t>(most), "byte"));
   throw Error("{} {}: the name is too long; choose a shorter one", option, path.string());
 }
 
