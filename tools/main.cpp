@@ -220,7 +220,8 @@ std::string outOfMemory(const CLI::App& app) {
   std::string options;
   for (const CLI::App* const command : app.get_subcommands())
     for (const char* const name : {"--memory", "--size"})
-      if (command->get_option_no_throw(name)) options += (options.empty() ? "lower " : " or ") + std::string(name);
+      if (command->get_option_no_throw(name))
+        options += (options.empty() ? "lower " : " or ") + std::string(name);
   return fmt::format("out of memory; {}, or use a machine with more memory",
                      options.empty() ? "ask for less" : options);
 }

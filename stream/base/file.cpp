@@ -16,6 +16,7 @@
 #include "stream/base/error.h"
 #include "stream/base/mirror.h"
 #include "stream/base/os.h"
+#include "stream/base/progress.h"
 #include "stream/base/text.h"
 
 namespace curvisplat {
@@ -211,7 +212,18 @@ InputFile::~InputFile() {
   if (fd_ >= 0) SystemCalls::current().close(fd_);
 }
 
+namespace {
+thread_local const Progress* stops_reads = nullptr;  // StoppableReads
+}  // namespace
+
+StoppableReads::StoppableReads(const Progress& progress) : before_(std::exchange(stops_reads, &progress)) {}
+
+StoppableReads::~StoppableReads() {
+  stops_reads = before_;
+}
+
 void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
+  if (stops_reads) stops_reads->throwIfStopped();
   size_t done = 0;
   while (done < to.size()) {
     const size_t count = std::min(to.size() - done, kLargestTransfer);

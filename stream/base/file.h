@@ -129,6 +129,22 @@ class InputFile {
   uint64_t size_ = 0;
 };
 
+class Progress;
+
+/// While it lives, reads of InputFiles by this thread throw Interrupted once `progress` is stopped: for opening grids, which the
+/// readers of many formats do in loops of their own. Not for work that also reads to clean up.
+class StoppableReads {
+ public:
+  /// `progress` outlives it.
+  explicit StoppableReads(const Progress& progress);
+  ~StoppableReads();
+  StoppableReads(const StoppableReads&) = delete;
+  StoppableReads& operator=(const StoppableReads&) = delete;
+
+ private:
+  const Progress* const before_;
+};
+
 /// A file that is written by position or at its end. Threads may write separate ranges at the same time;
 /// append() is for one thread at a time. The destructor closes the file and ignores errors: call close() to
 /// detect them.

@@ -3,16 +3,19 @@
 #include <unistd.h>
 
 #include <array>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/plugin.h"
+#include "stream/base/progress.h"
 #include "stream/base/temporary_files.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/faulty_system_calls.h"
@@ -107,6 +110,42 @@ TEST_F(FileTest, DirectTransfersThatAreCutShortGoOnThroughThePageCache) {
     in.readAt(0, std::as_writable_bytes(std::span(back)));
     for (size_t n = 0; n < kPages; ++n) EXPECT_EQ(back[n].bytes, pages[n].bytes) << n;
   }
+}
+
+TEST_F(FileTest, ReadsOfOneThreadEndOnceAJobIsStopped) {
+  std::ofstream(folder / "file") << "abc";
+  const InputFile in(folder / "file");
+  std::array<std::byte, 3> bytes{};
+  Progress job, other;
+  {
+    const StoppableReads outer(other);
+    {
+      const StoppableReads reading(job);
+      in.readAt(0, std::span(bytes));
+      job.stop(SIGINT);
+      EXPECT_THROW(in.readAt(0, std::span(bytes)), Interrupted);
+      std::thread([&] { in.readAt(0, std::span(bytes)); }).join();
+    }
+    in.readAt(0, std::span(bytes));
+    other.stop(SIGINT);
+    EXPECT_THROW(in.readAt(0, std::span(bytes)), Interrupted);
+  }
+  in.readAt(0, std::span(bytes));
+}
+
+TEST_F(FileTest, ANameIsMissingOrThereOrCannotBeLookedAt) {
+  std::ofstream(folder / "file") << "abc";
+  fs::create_symlink("file", folder / "link");
+  fs::create_symlink("none", folder / "dangling");
+  fs::create_symlink("loop", folder / "loop");
+  for (const char* const name : {"file", "link"}) EXPECT_TRUE(isFileThere(folder / name));
+  for (const char* const name : {"none", "file/below"}) EXPECT_FALSE(isFileThere(folder / name));
+  EXPECT_TRUE(isThere(folder));
+  const auto reason = [&](const fs::path& path) { return errorOf([&] { isFileThere(path); }); };
+  EXPECT_PRED2(says, reason(folder), "is not a regular file");
+  EXPECT_PRED2(says, reason(folder / "dangling"), "is a link to none, which does not exist");
+  EXPECT_PRED2(says, reason(folder / "loop"), "cannot be looked at");
+  EXPECT_PRED2(says, reason(folder / std::string(5000, 'a')), "cannot be looked at");
 }
 
 TEST_F(FileTest, FailuresNameThePathThePlaceAndTheReason) {

@@ -290,6 +290,20 @@ void noteTimeSteps(const std::vector<fs::path>& files, const GridDescription& de
       description.time_step == 0 ? "the first" : "the last, since the first is constant,", names));
 }
 
+/// What `open` returns. Throws Interrupted soon after `progress` is stopped.
+template <typename Open>
+auto openStoppably(const Progress& progress, const Open& open) {
+  try {
+    const StoppableReads reading(progress);
+    auto opened = open();
+    progress.throwIfStopped();
+    return opened;
+  } catch (const Error&) {
+    progress.throwIfStopped();  // readers may take a read that was stopped for a file of another kind
+    throw;
+  }
+}
+
 /// Makes a series beside its place, since a cache of its first steps looks complete. It is not moved when it
 /// is complete, since a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
@@ -297,7 +311,7 @@ void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& p
                 ValuePrecision precision) {
   const auto folder = std::make_shared<PreviewFolder>(output.parent_path(), kSeries);
   arguments.output = folder->path() / output.filename();
-  const std::vector<StepFiles> steps = stepsOf(arguments.grid);
+  const std::vector<StepFiles> steps = openStoppably(progress, [&] { return stepsOf(arguments.grid); });
   SeriesOptions options;
   const std::string title = arguments.grid.grid.stem().string();
   options.convert = optionsFor(arguments.output, title);
@@ -343,14 +357,14 @@ void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, P
     return makeSeries(arguments, output, progress, events, scalars, precision);
   ConvertOptions options = optionsFor(output, files.front().stem().string());
   options.precision = precision;
-  std::unique_ptr<DataSource> source = openSource(arguments, output);
+  std::unique_ptr<DataSource> source = openStoppably(progress, [&] { return openSource(arguments, output); });
   options.scalars = scalarsOf(arguments, scalars, source->description());
   makePreview(*source, options, false, progress, events);
   ConvertReport report = convertNarrow(*source, options, scalars, progress);
   const auto takeStep = [&](uint32_t step) {
     arguments.grid.time_step = step;
     const std::vector<GridScalar> before = source->description().scalars;
-    source = openSource(arguments, output);
+    source = openStoppably(progress, [&] { return openSource(arguments, output); });
     // Choosing scalars prints notes; it is repeated only if the step has other scalars.
     if (!std::ranges::equal(before, source->description().scalars, isSameScalar))
       options.scalars = scalarsOf(arguments, scalars, source->description());
