@@ -215,7 +215,7 @@ int fail(const std::string& line, int status) {
   return status;
 }
 
-/// What helps: those options of the command that hold most of its memory.
+/// Names the options of the command that lower its memory.
 std::string outOfMemory(const CLI::App& app) {
   std::string options;
   for (const CLI::App* const command : app.get_subcommands())

@@ -131,8 +131,8 @@ class InputFile {
 
 class Progress;
 
-/// While it lives, reads of InputFiles by this thread throw Interrupted once `progress` is stopped: for opening grids, which the
-/// readers of many formats do in loops of their own. Not for work that also reads to clean up.
+/// Makes this thread's reads of InputFiles throw Interrupted once `progress` is stopped, while it lives. It serves the opening of
+/// grids, where readers of many formats loop by themselves. Work that reads to clean up cannot use it.
 class StoppableReads {
  public:
   /// `progress` outlives it.

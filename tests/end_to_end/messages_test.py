@@ -263,7 +263,7 @@ class Messages(FormatCase):
     def test_unstructured_caches_have_no_faces(self):
         cache = self.convert([self.wedge("a.vtk", "p")], "p")
         self.expect_error(["render", cache, "-o", self.folder / "a.png", "--surface", "all"],
-                          "the cache is of an unstructured grid, whose faces are not kept; name an STL, PLY or OBJ file")
+                          "the cache is of an unstructured grid, whose faces are not kept; name an STL, PLY, OBJ or VTP file")
 
     def test_scalars_of_the_other_centring(self):
         grid, kept = self.legacy("a b.vtk"), self.folder / "kept"

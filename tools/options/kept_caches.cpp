@@ -333,7 +333,7 @@ class StampedFiles {
         addFolder(root / name);
         apart.insert(root / name);
       }
-    // Of other files are read those that values include: small texts.
+    // Values may include other files, which are small texts.
     for (const char* const written : {"postProcessing", "VTK", "dynamicCode"}) apart.insert(folder / written);
     addFolder(folder, apart, kMaxText);
   }

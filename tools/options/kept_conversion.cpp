@@ -290,7 +290,7 @@ void noteTimeSteps(const std::vector<fs::path>& files, const GridDescription& de
       description.time_step == 0 ? "the first" : "the last, since the first is constant,", names));
 }
 
-/// What `open` returns. Throws Interrupted soon after `progress` is stopped.
+/// Returns what `open` returns. Throws Interrupted soon after `progress` is stopped.
 template <typename Open>
 auto openStoppably(const Progress& progress, const Open& open) {
   try {

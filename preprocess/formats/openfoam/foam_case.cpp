@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the folder holds; nothing if there is no such folder.
+/// Returns the paths in the folder; none if there is no such folder.
 std::vector<fs::path> entriesOf(const fs::path& folder) {
   std::vector<fs::path> entries;
   if (!isThere(folder)) return entries;
